@@ -10,13 +10,15 @@ from __future__ import annotations
 
 from analysis.command.cli import parse
 from analysis.command.extras import require_extra
-from analysis.conversion.options import CheckOptions
+from analysis.conversion.options import FORMATS_OF, CheckOptions
 
 
 def main() -> None:
     """Parses, converts, renders, prints the tables."""
     options = parse(CheckOptions, __doc__ or "")
     require_extra("formats", "peers")
+    if options.mutations or (options.matrix and "usd" in (options.formats or FORMATS_OF)):
+        require_extra("usd")
     from analysis.command.console import show
     from analysis.conversion.run import check
 

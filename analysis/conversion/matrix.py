@@ -1,8 +1,8 @@
 """Every light and every material in every pair of formats, compared by the pictures of the formats' own renderers.
 
 A specimen is written in one format, converted to another, and both files are drawn. Mitsuba 3 draws files of Mitsuba 3
-and, with their tree upgraded, of Mitsuba 0.5; LuxCore draws those of LuxRender. PBRT has no engine here: its files are
-read again and drawn by Mitsuba 3.
+and, with their tree upgraded, of Mitsuba 0.5; LuxCore draws those of LuxRender. PBRT, glTF and USD have no engine here:
+their files are read again and drawn by Mitsuba 3.
 """
 
 from __future__ import annotations
@@ -20,15 +20,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from analysis.command.progress import Task
+from analysis.conversion.options import FORMATS_OF
 from analysis.conversion.peers import RenderedImage, rendered
 from analysis.conversion.specimens import CELL_PX, DISTANT, LAMPS, Specimens, distant, lamp, materials
 from scenes.canonical import Scene
 from scenes.formats.conversion import load_scene_file, save_scene_file
 from scenes.formats.losses import LossReport
-
-FORMATS_OF = {"pbrt": ".pbrt", "pbrt4": ".pbrt", "mitsuba": ".xml", "mitsuba3": ".xml", "luxrender": ".lxs",
-              "gltf": ".gltf"}  # fmt: skip
-"""Formats and the endings of their files."""
 
 ENGINES = {"mitsuba": "mitsuba", "mitsuba3": "mitsuba", "luxrender": "luxcore"}
 
@@ -112,12 +109,14 @@ def matrix_rows(
 
 
 def read(file: Path, like: Scene, sky: bool, report: LossReport | None = None) -> Scene:
-    """The scene of a file; that of glTF gets the depth of paths of another scene, and with ``sky`` its lights."""
+    """The scene of a file; that of glTF and USD gets the depth of paths of another scene, and with ``sky`` that of glTF
+    its lights."""
     scene = load_scene_file(file, None, report)
-    if file.suffix != FORMATS_OF["gltf"]:
-        return scene
-    scene = dataclasses.replace(scene, integrator=like.integrator)
-    return dataclasses.replace(scene, lights=like.lights, ambient=(0.0,) * 3, background=None) if sky else scene
+    if file.suffix in (FORMATS_OF["gltf"], FORMATS_OF["usd"]):
+        scene = dataclasses.replace(scene, integrator=like.integrator)
+    if sky and file.suffix == FORMATS_OF["gltf"]:
+        scene = dataclasses.replace(scene, lights=like.lights, ambient=(0.0,) * 3, background=None)
+    return scene
 
 
 def _rows(found: Specimens, gallery: Gallery, formats: tuple[str, ...]) -> Iterator[dict[str, Any]]:

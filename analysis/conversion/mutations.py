@@ -29,8 +29,9 @@ LIMIT_S, LIMIT_MB = 5.0, 1024.0
 
 _STUCK_S = 60.0
 _BATCH = 50
-_WORDS = (b" nan ", b" 1e308 ", b" -1 ", b' "', b" [ ", b" ] ", b" 0 ", b"AttributeBegin ", b"AttributeEnd ")
-_NEWER = {"pbrt4": "-4.pbrt", "mitsuba3": "-3.xml", "gltf": ".gltf"}
+_WORDS = (b" nan ", b" 1e308 ", b" -1 ", b' "', b" [ ", b" ] ", b" 0 ", b"AttributeBegin ", b"AttributeEnd ",
+          b" { ", b" } ", b"</World>", b"over ")  # fmt: skip
+_NEWER = {"pbrt4": "-4.pbrt", "mitsuba3": "-3.xml", "gltf": ".gltf", "usd": ".usda"}
 
 
 def mutated(content: bytes, rng: np.random.Generator) -> bytes:

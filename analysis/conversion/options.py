@@ -12,6 +12,10 @@ from analysis.command import limits
 from scenes.formats import FORMATS
 from tsar.config import require
 
+FORMATS_OF = {"pbrt": ".pbrt", "pbrt4": ".pbrt", "mitsuba": ".xml", "mitsuba3": ".xml", "luxrender": ".lxs",
+              "gltf": ".gltf", "usd": ".usda"}  # fmt: skip
+"""Formats of the matrix and the endings of their files."""
+
 
 @dataclass(frozen=True)
 class ConvertOptions:
@@ -55,8 +59,9 @@ class CheckOptions:
     """Check the places of known lamps in the pictures, from every format to every other."""
     matrix: bool = False
     """Compare every light and every material in every pair of formats."""
-    formats: tuple[str, ...] = ()
-    """Formats of the matrix: pbrt, pbrt4, mitsuba, mitsuba3, luxrender, gltf; by default all."""
+    formats: Annotated[
+        tuple[str, ...], tyro.conf.arg(help=f"Formats of the matrix: {', '.join(FORMATS_OF)}; by default all.")
+    ] = ()
     mutations: int = 0
     """Change the scene files (by default the Cornell boxes) at random so many times, read each and count failures,
     instead of rendering. A run in the same folder goes on where an earlier one was."""
@@ -79,8 +84,8 @@ class CheckOptions:
     def __post_init__(self) -> None:
         limits.within(self, width_px=(16, 4096), samples=(1, 1 << 16), limit_s=(1e-3, 86400.0), mutations=(0, 1 << 24),
                       seed=(0, 1 << 31))  # fmt: skip
-        known = ("pbrt", "pbrt4", "mitsuba", "mitsuba3", "luxrender", "gltf")
-        require(set(self.formats) <= set(known), "formats", f"some of {', '.join(known)}", " ".join(self.formats))
+        known = f"some of {', '.join(FORMATS_OF)}"
+        require(set(self.formats) <= set(FORMATS_OF), "formats", known, " ".join(self.formats))
         given = bool(self.scenes) or self.markers or self.matrix or self.mutations > 0
         require(given, "scenes", "scene files, --markers, --matrix or --mutations", "none of them")
         for scene in self.scenes:

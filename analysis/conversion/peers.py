@@ -13,9 +13,14 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from scenes.formats.mitsuba.write_materials import BLUNT
+
 # A file of Mitsuba 0.5 is upgraded to Mitsuba 3 by editing its tree, without this project's importer, so that its
-# picture is an independent reference. Version 3 renames most properties itself.
-_MITSUBA = """
+# picture is an independent reference. Version 3 renames most properties itself. Its blend with a perfect mirror or
+# glass loses light, which that of 0.5 does not: there both get facets of a small alpha.
+_MITSUBA = (
+    f"BLUNT = {BLUNT}"
+    + """
 import os, sys, numpy as np, mitsuba as mi, xml.etree.ElementTree as E
 file, out, width, height, samples, seed = sys.argv[1], sys.argv[2], *map(int, sys.argv[3:])
 mi.set_variant("scalar_rgb")
@@ -29,6 +34,12 @@ def linear(text):
         values = [float(part) for part in text.replace(",", " ").split()]
     return ", ".join(repr(v / 12.92 if v <= 0.04045 else ((v + 0.055) / 1.055) ** 2.4) for v in values)
 
+for blend in root.iter("bsdf"):
+    for node in blend.iter("bsdf") if old and blend.get("type") == "blendbsdf" else ():
+        if node.get("type") in ("conductor", "dielectric"):
+            node.set("type", "rough" + node.get("type"))
+            node.append(E.Element("float", name="alpha", value=str(BLUNT)))
+
 for parent in list(root.iter()):
     for node in list(parent):
         if node.tag == "film":
@@ -40,7 +51,7 @@ for parent in list(root.iter()):
             node.set("type", "independent")
             node[:] = []
         elif old and node.tag == "integrator":
-            node.set("type", "path")
+            node.set("type", "volpath" if node.get("type") == "volpath" else "path")
             node[:] = [part for part in node if part.get("name") == "maxDepth"]
         elif old and node.tag == "srgb":
             node.tag = "rgb"
@@ -71,6 +82,7 @@ parameters[size] = [width, height]
 parameters.update()
 np.save(out, np.array(mi.render(scene, spp=samples, seed=seed))[..., :3])
 """
+)
 
 # LuxCore's pictures begin with the bottom row, and are one row too low: it takes the ray of row y from
 # height - y - 1, not from height - y. The missing row at the bottom repeats the row above it.

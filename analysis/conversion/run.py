@@ -12,7 +12,7 @@ import pandas as pd
 from analysis.command.cli import bad_input
 from analysis.command.console import Table, frame_table
 from analysis.command.progress import Task, bars
-from analysis.conversion.options import CheckOptions, ConvertOptions
+from analysis.conversion.options import FORMATS_OF, CheckOptions, ConvertOptions
 from analysis.storage.files import write_json, write_table
 from analysis.storage.results import own_results
 from analysis.storage.summary import with_source, write_summary
@@ -47,7 +47,7 @@ def check(options: CheckOptions) -> list[Table]:
     """
     from analysis.conversion.check import checked
     from analysis.conversion.markers import marker_offsets
-    from analysis.conversion.matrix import FORMATS_OF, GROUPS, matrix_rows, worst
+    from analysis.conversion.matrix import GROUPS, matrix_rows, worst
     from analysis.conversion.mutations import summed
 
     with bad_input():

@@ -41,6 +41,8 @@ from scenes.models.usd_views import LAMP, camera_of, glow_of, light_of
 
 _GREY = 0.18
 _ADDRESS = re.compile(r"anon:0x[0-9a-fA-F]+:?")
+_RULE = re.compile(r" matching pxrInternal.*?(?= at ')")  # of OpenUSD's grammar
+_SAID_MOST = 200  # characters of a message, which may quote the rest of the file
 _Part = tuple[Any, Material, Matrix]
 
 
@@ -60,11 +62,11 @@ def read_usd(sources: Sources, report: LossReport, facets: bool = False) -> Mode
                 path = sources.path.parent / layer.realPath
                 sources.files.setdefault(path, state_of(path))
         for error in sorted(_ADDRESS.sub("", str(error)) for error in stage.GetCompositionErrors()):
-            report.add(sources.path.stem, " ".join(error.split())[:200])
+            report.add(sources.path.stem, " ".join(error.split())[:_SAID_MOST])
         return _Reader(stage, sources, report, facets).model()
     except Tf.ErrorException as error:
-        said = " ".join(str(error.args[0].commentary).split())
-        raise SceneError(f"cannot be read: {said.removeprefix(f'{sources.path}:')}") from None
+        said = _RULE.sub("", " ".join(str(error.args[0].commentary).split()))
+        raise SceneError(f"cannot be read: {said.removeprefix(f'{sources.path}:')[:_SAID_MOST]}") from None
     finally:
         quiet.TakeCoalescedDiagnostics()
         del quiet

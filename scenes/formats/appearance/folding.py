@@ -129,6 +129,19 @@ def _greatest(texture: Texture, again: Callable[[Texture], float]) -> float:
     return parts[0] * parts[1] if isinstance(texture, ScaleTexture) else max(parts)
 
 
+def is_binary(texture: Texture) -> bool:
+    """Whether all values of a texture are 0 or 1, between its texels aside."""
+    return once_a_node(_binary, texture)
+
+
+def _binary(texture: Texture, again: Callable[[Texture], bool]) -> bool:
+    if isinstance(texture, ConstantTexture):
+        return set(texture.value) <= {0.0, 1.0}
+    if isinstance(texture, ImageTexture):
+        return bool(np.isin(texture.image, (0.0, 1.0)).all())
+    return isinstance(texture, CheckerboardTexture) and again(texture.even) and again(texture.odd)
+
+
 def height_of(material: Bumped) -> Texture:
     """The height of a bump map in scene units, with its scale applied."""
     return product_of(material.height, ConstantTexture(grey(material.scale)))

@@ -41,6 +41,17 @@ def is_nothing(material: Material) -> bool:
     return isinstance(material, Masked) and material.opacity == NOTHING.opacity
 
 
+def lets_through(material: Material) -> bool:
+    """Whether light goes straight through a surface, or through a part of it: holes and panes."""
+    return once_a_node(_lets_through, material)
+
+
+def _lets_through(part: Material | Texture, again: Callable[[Material | Texture], bool]) -> bool:
+    if isinstance(part, Masked) or (isinstance(part, Glass) and part.thin):
+        return True
+    return any(again(inner) for inner in parts_of(part) if not isinstance(inner, Texture))
+
+
 def direct_if_same(scene: Scene) -> Scene:
     """The scene with direct light in place of Whitted's method, if nothing mirrors, refracts or has holes: rays of this
     method go on from such surfaces alone, so the picture is the same."""

@@ -108,6 +108,8 @@ class LuxSurfaces(SurfaceFactory):
         if "cauchyb" in parameters and self.scalar(parameters, "cauchyb", 0.0):
             self.report.add(str(parameters.place), "dispersion (cauchyb)", "one index for all colours")
         thin = parameters.truth("architectural", False)
+        if thin:
+            self.report.add(str(parameters.place), "architectural glass", "a pane, which reflects as much at its back")
         return Glass(*parts, self.scalar(parameters, "index", 1.5), facets.roughness, thin, alpha=facets.alpha)
 
     def _named_metal(self, parameters: Parameters) -> Material:

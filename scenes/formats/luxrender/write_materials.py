@@ -19,6 +19,7 @@ from scenes.canonical import (
     Material,
     Matte,
     Metal,
+    Mirror,
     MixMaterial,
     Phong,
     Plastic,
@@ -27,10 +28,10 @@ from scenes.canonical import (
     Uber,
 )
 from scenes.formats.appearance.facets import Facets
-from scenes.formats.appearance.folding import mean_of, product_of
+from scenes.formats.appearance.folding import is_binary, mean_of, product_of
 from scenes.formats.appearance.indices import reflectance_of_index
-from scenes.formats.appearance.mixtures import added_coat, dimmed, lobes_of
-from scenes.formats.appearance.spectra import METALS, rgb
+from scenes.formats.appearance.mixtures import NOTHING, added_coat, dimmed, is_nothing, lets_through, lobes_of
+from scenes.formats.appearance.spectra import METALS, grey, rgb
 from scenes.formats.directives.surface_writer import SurfaceWriter, mixture_line
 from scenes.formats.geometry.conventions import first_row_below
 from scenes.formats.text.numbers import listed, number
@@ -66,11 +67,19 @@ class LuxSurfaceWriter(SurfaceWriter):
         elif isinstance(material, Metal) and _even(material.reflectance_scale):
             material = dimmed(material)
         if isinstance(material, MixMaterial):
+            self._lose_light_of_mixture(material, where)
             first, second = self.material(material.first), self.material(material.second)
             if isinstance(material.amount, ConstantTexture) and len(set(material.amount.value)) > 1:
                 self.report.add(where, "a mixture with a share for each colour", "by their mean")
             return mixture_line(first, second, self.texture(material.amount, "amount", "float"))
         return super().material_line(material, name)
+
+    def _lose_light_of_mixture(self, material: MixMaterial, where: str) -> None:
+        """LuxCore 2.10 lets a share of the rays through a mixture with holes or panes, and weights the light that it
+        samples at the others by the share of their part once more."""
+        parts = [NOTHING if part is self._null else part for part in (material.first, material.second)]
+        if any(map(lets_through, parts)) and not is_binary(material.amount) and not all(map(_is_sharp, parts)):
+            self.report.add(where, "light on a part of a mixture with holes or panes", "darker by its share in LuxCore")
 
     def _nothing(self) -> Material:
         """An invisible surface."""
@@ -128,6 +137,12 @@ class LuxSurfaceWriter(SurfaceWriter):
         parts.append(f'"float index" [ {number(material.ior)} ]')
         if material.roughness != (0.0, 0.0):
             return "roughglass", [*parts, self.facets(material)]
+        if material.thin:
+            front = reflectance_of_index(grey(material.ior), grey(0.0))[0]
+            became = (
+                f"one in LuxCore that reflects {front:.3g} at its front and lets all through, and nothing at its back"
+            )
+            self.report.add(where, "a pane", became)
         return "glass", [*parts, f'"bool architectural" [ "{str(material.thin).lower()}" ]']
 
     def _metal(self, material: Metal, where: str) -> tuple[str, list[str]]:
@@ -143,6 +158,13 @@ class LuxSurfaceWriter(SurfaceWriter):
             if material.k != (0.0, 0.0, 0.0) or not plain:
                 self.report.add(where, "the complex index of a metal", "its colour at normal incidence")
         return "metal2", [f'"texture fresnel" [ "{label}" ]', self.facets(material)]
+
+
+def _is_sharp(material: Material) -> bool:
+    """Whether a surface is invisible, or mirrors and refracts alone."""
+    if isinstance(material, Metal | Glass):
+        return material.roughness == (0.0, 0.0)
+    return is_nothing(material) or isinstance(material, Mirror)
 
 
 def _even(scale: Texture) -> bool:

@@ -37,7 +37,7 @@ FILTERS = {"box": "box", "tent": "tent", "gaussian": "gaussian", "mitchell": "mi
 _RADII = {"box": 0.5, "tent": 1.0, "gaussian": 2.0, "mitchell": 2.0, "sinc": 3.0}
 SAMPLERS = {"independent": "independent", "stratified": "stratified", "sobol": "sobol", "ldsampler": "sobol",
             "halton": "halton", "hammersley": "hammersley"}  # fmt: skip
-INTEGRATORS = {"path": "path", "volpath": "path", "volpath_simple": "path", "direct": "direct", "ao": "direct",
+INTEGRATORS = {"path": "path", "volpath_simple": "path", "direct": "direct", "ao": "direct",
                "bdpt": "bidirectional", "mlt": "metropolis", "pssmlt": "metropolis", "erpt": "metropolis",
                "photonmapper": "photonmap", "ppm": "photonmap", "sppm": "photonmap", "ptracer": "path",
                "adaptive": "path", "irrcache": "path", "vpl": "path"}  # fmt: skip
@@ -58,6 +58,8 @@ class MitsubaSettings:
 
     def _integrator(self, node: XmlNode) -> None:
         kind, properties = node.get("type"), Properties(node, self.report)
+        if kind == "volpath":  # the same in scenes without holes, and written for those with such
+            kind = "path"
         name = self.report.kind(INTEGRATORS, kind, "integrator", node.place, kind not in SAME_PICTURE)
         edges = properties.whole("maxDepth", -1, -1, 1 << 20)
         for child in properties.rest:

@@ -26,7 +26,7 @@ from scenes.canonical import (
     Sphere,
 )
 from scenes.canonical.values import Matrix
-from scenes.formats.appearance.mixtures import direct_if_same
+from scenes.formats.appearance.mixtures import direct_if_same, lets_through
 from scenes.formats.geometry.conventions import FAR
 from scenes.formats.geometry.meshed import as_mesh, depends_on_uv
 from scenes.formats.geometry.orientation import FLIPPED, scales_evenly, upright
@@ -92,6 +92,10 @@ class MitsubaWriter(MitsubaLightWriter):
         if scene.integrator.kind == "whitted":
             kind = "path"  # follows mirrors and glass
             self.report.add("integrator", "whitted", "path")
+        if kind == "path" and any(
+            map(lets_through, {id(one.material): one.material for one in scene.instances}.values())
+        ):
+            kind = "volpath"  # whose light passes holes, which that of path does not
         made = self.plugin("integrator", kind, self.root)
         if kind != "direct":
             self.put(made, "integer", "maxDepth", str(depth if depth < 0 else depth + 1))

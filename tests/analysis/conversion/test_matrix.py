@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
+from importlib.util import find_spec
 from pathlib import Path
 from typing import get_args
 
@@ -11,7 +12,8 @@ import numpy as np
 import pytest
 
 from analysis.command.progress import Task
-from analysis.conversion.matrix import BOUND, FORMATS_OF, GROUPS, differences, losses, matrix_rows, read, worst
+from analysis.conversion.matrix import BOUND, GROUPS, differences, losses, matrix_rows, read, worst
+from analysis.conversion.options import FORMATS_OF
 from analysis.conversion.specimens import CELL_PX, DISTANT, LAMPS, MATERIALS
 from scenes.canonical import Material, Metal
 from scenes.formats.conversion import load_scene_file, save_scene_file
@@ -24,14 +26,18 @@ def test_the_matrix_has_every_material_of_the_canonical_scene() -> None:
     assert set(SINGLE) == {*MATERIALS, *LAMPS, *DISTANT}
 
 
-@pytest.mark.parametrize("target", FORMATS_OF)
+needs_usd = pytest.param("usd", marks=pytest.mark.skipif(find_spec("pxr") is None, reason="usd-core is missing"))
+FORMATS = [needs_usd if name == "usd" else name for name in FORMATS_OF]
+
+
+@pytest.mark.parametrize("target", FORMATS)
 def test_every_specimen_is_written_and_read_again(target: str, tmp_path: Path) -> None:
     for scene in SINGLE.values():
         losses(scene, "scene", target, tmp_path)
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("source", FORMATS_OF)
+@pytest.mark.parametrize("source", FORMATS)
 def test_every_specimen_of_every_format_becomes_every_other(source: str, tmp_path: Path) -> None:
     for scene in SINGLE.values():
         for target in FORMATS_OF:
@@ -41,9 +47,9 @@ def test_every_specimen_of_every_format_becomes_every_other(source: str, tmp_pat
 @pytest.mark.parametrize(("specimen", "loss"), [("normal-mapped", "a normal map"), ("height field", "a height field"),
                          ("metallic-roughness", "a metallic-roughness surface")])  # fmt: skip
 def test_what_no_format_has_is_a_loss(specimen: str, loss: str, tmp_path: Path) -> None:
-    for target in FORMATS_OF:
-        if target == "gltf" and specimen != "height field":
-            continue  # it has both
+    for target in set(FORMATS_OF) - {"usd" if find_spec("pxr") is None else ""}:
+        if target in ("gltf", "usd") and specimen != "height field":
+            continue  # they have both
         if (specimen, target) == ("normal-mapped", "mitsuba3"):
             continue  # it has normal maps
         assert any(one.startswith(loss) for one in losses(SINGLE[specimen], "scene", target, tmp_path)[0])
@@ -76,6 +82,13 @@ def test_gltf_holds_these_materials_without_a_loss_under_the_sky_of_the_furnace(
     save_scene_file(SINGLE[specimen], tmp_path / "a.gltf")
     lit, bare = (read(tmp_path / "a.gltf", SINGLE[specimen], sky) for sky in (True, False))
     assert lit.lights == SINGLE[specimen].lights != bare.lights and lit.integrator == bare.integrator
+
+
+@pytest.mark.parametrize("specimen", ["matte", "glass", "environment, even", "point", "lamp, sphere", "directional"])
+def test_usd_holds_these_without_a_loss_but_for_the_depth_of_paths(specimen: str, tmp_path: Path) -> None:
+    assert losses(SINGLE[specimen], "scene", "usd", tmp_path)[0] == []
+    found = read(tmp_path / "single.usda", SINGLE[specimen], True)
+    assert found.integrator == SINGLE[specimen].integrator and len(found.lights) == len(SINGLE[specimen].lights)
 
 
 @pytest.mark.slow
@@ -111,5 +124,6 @@ def test_the_worst_pair_of_a_specimen_is_named() -> None:
 def test_point_lights_are_as_bright_in_every_pair(tmp_path: Path) -> None:
     pytest.importorskip("mitsuba")
     pytest.importorskip("pyluxcore")
+    pytest.importorskip("pxr")
     rows = matrix_rows(tmp_path, 64, 120.0, Task(), ("point",))
-    assert len(rows) == 42 and all(row["note"] == "" and row["off"] < BOUND for row in rows), rows
+    assert len(rows) == 56 and all(row["note"] == "" and row["off"] < BOUND for row in rows), rows

@@ -20,6 +20,7 @@ from tests.scenes.formats.files import DATA, DELIVERED, HEAD, MITSUBA, REAL, SEN
 
 def changed(count: int, folder: Path) -> dict[str, float]:
     """What changed files came to; those beside this project are changed where they are, else the delivered ones."""
+    pytest.importorskip("pxr")
     names = [f"{DATA}/{name}" for name in (*REAL, *MITSUBA)]
     delivered = [DELIVERED / f"cornell-box{ending}" for ending in (".pbrt", ".lxs", ".xml")]
     sources = sources_in(folder, tuple(map(Path, names)) or tuple(delivered), DATA if names else DELIVERED)

@@ -35,6 +35,16 @@ def test_values_that_are_not_finite_are_refused(body: str, where: str, tmp_path:
     assert where in said and "in.usda" in said and "expected" in said and "\n" not in said
 
 
+@pytest.mark.parametrize("wrong", ["(0, 0)", "{", "((0, 0, 0), 0, 0)"])
+def test_messages_of_the_library_do_not_quote_the_file(wrong: str, tmp_path: Path) -> None:
+    """OpenUSD quotes all that follows the fault, and names its own functions."""
+    points = ", ".join([wrong, *(2000 * ["(0, 0, 1)"])])
+    with pytest.raises(SceneError) as refused:
+        read_whole(written(tmp_path, f'def Mesh "m" {{ point3f[] points = [{points}] }}'))
+    said = str(refused.value)
+    assert len(said) < 300 + len(str(tmp_path)) and "pxr" not in said and "\n" not in said, said
+
+
 def test_lights_without_an_angle_or_extent(tmp_path: Path) -> None:
     body = """def DistantLight "sun" { float inputs:angle = -1 }
     def RectLight "panel" { bool inputs:normalize = 1
