@@ -18,19 +18,21 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scenes.canonical import SceneError
-from scenes.models.gltf_records import COMPONENTS, WIDTHS, record_of
+from scenes.models.gltf_records import COMPONENTS, WHOLE, WIDTHS, Records
 from scenes.models.json_records import described, misplaced, require
 from scenes.models.sources import Sources
 
 _GLB, _JSON, _BIN = 0x46546C67, 0x4E4F534A, 0x004E4942
 _COUNT_MAX, _ZEROS_MAX = 1 << 28, 1 << 22
+_WHOLE_MAX = float(1 << 53)
 
 
 class GltfData:
     """A glTF or GLB file.
 
     Attributes:
-        json: parsed JSON object, which is what :mod:`scenes.models.gltf_records` says.
+        json: parsed JSON object; whole numbers are ``int``, and null is absent.
+        records: what its objects must be.
     """
 
     def __init__(self, sources: Sources) -> None:
@@ -49,7 +51,9 @@ class GltfData:
         if not (isinstance(version, str) and version.startswith("2.")):
             got = version if isinstance(version, str) else described(version)
             raise SceneError(f"cannot be read: asset.version: expected glTF 2, got version {got or 'none'}")
-        require(self.json, record_of(self.json))
+        require(self.json, WHOLE)
+        self.records = Records(self.json)
+        self._checked: set[tuple[str, int]] = set()
         self._buffers: dict[int, bytes] = {}
 
     def _chunks(self, content: bytes) -> bytes:
@@ -74,8 +78,16 @@ class GltfData:
         return self.json.get(name, [])
 
     def at(self, name: str, index: int) -> dict[str, Any]:
-        """An object of such a list; its index was checked."""
-        return self.items(name)[index]
+        """An object of such a list, whose index was checked; the object is checked at its first use.
+
+        Raises:
+            SceneError: one of its values is not what the format has there.
+        """
+        found = self.items(name)[index]
+        if (name, index) not in self._checked:
+            require(found, self.records.of[name], f"{name}[{index}]")
+            self._checked.add((name, index))
+        return found
 
     def resource(self, uri: str, place: str, what: str) -> bytes:
         """The bytes of a URI: embedded data, or a file beside it."""
@@ -190,9 +202,20 @@ def _strided(
     return rows.copy()
 
 
+def _number(text: str) -> float:
+    """A number; ``4.0`` is a whole one, as in the JSON schema of the format, and ``-0.0`` keeps its sign."""
+    value = float(text)
+    return int(value) if value.is_integer() and abs(value) < _WHOLE_MAX and (value or text[0] != "-") else value
+
+
+def _given(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
+    """An object without the properties that are null."""
+    return {name: value for name, value in pairs if value is not None}
+
+
 def _parsed(content: bytes) -> Any:
     try:
-        return json.loads(content.decode("utf-8-sig"))
+        return json.loads(content.decode("utf-8-sig"), parse_float=_number, object_pairs_hook=_given)
     except json.JSONDecodeError as error:
         where = f"line {error.lineno}, column {error.colno}"
         raise SceneError(f"cannot be read: {where}: expected JSON ({error.msg})") from None

@@ -84,14 +84,14 @@ class _Reader:
         return Model(tuple(self._parts), tuple(self._lights), self._cameras, "y")
 
     def _roots(self) -> list[int]:
-        scenes, nodes = self.data.items("scenes"), self.data.items("nodes")
+        scenes, count = self.data.items("scenes"), len(self.data.items("nodes"))
         if scenes:
             number = self.data.json.get("scene", 0)
             if number >= len(scenes):
                 raise misplaced("scene", f"an index of scenes below {len(scenes)}", number)
-            return scenes[number].get("nodes", [])
-        children = {child for node in nodes for child in node.get("children", ())}
-        return [number for number in range(len(nodes)) if number not in children]
+            return self.data.at("scenes", number).get("nodes", [])
+        children = {child for node in range(count) for child in self.data.at("nodes", node).get("children", ())}
+        return [number for number in range(count) if number not in children]
 
     def _node(
         self, number: int, above: Poses, frame: Matrix, track: RigidTrack | None, moving: bool, depth: int
@@ -130,7 +130,7 @@ class _Reader:
                 self.report.add(names, "a further camera of this name")
             self._cameras.setdefault(names, camera_at_node(self.data, node["camera"], matrix, track))
         if "KHR_lights_punctual" in node.get("extensions", {}):
-            self._add_light(node, matrix, name, moving)
+            self._add_light(number, matrix, name, moving)
         if "mesh" in node and "skin" in node:
             self._skinned.append((node, name))
         elif "mesh" in node:
@@ -143,8 +143,8 @@ class _Reader:
         for child in node.get("children", ()):
             self._node(child, above, frame, track, moving, depth + 1)
 
-    def _add_light(self, node: dict[str, Any], matrix: Matrix, name: str, moving: bool) -> None:
-        light = light_at_node(self.data, node["extensions"]["KHR_lights_punctual"]["light"], matrix, name, self.report)
+    def _add_light(self, number: int, matrix: Matrix, name: str, moving: bool) -> None:
+        light = light_at_node(self.data, number, matrix, name, self.report)
         if light is not None and moving:
             self.report.add(name, "a moving light", "the pose at its start")
         self._lights += [] if light is None else [light]

@@ -23,6 +23,7 @@ from scenes.formats.appearance.spectra import rgb
 from scenes.formats.losses import LossReport
 from scenes.models.gltf_facets import ALONG_PATHS, PARTS, FacetMaterials, lookups_beside
 from scenes.models.gltf_textures import Document, Lookup, Textures, Uvs, lookup_of, multiplied
+from scenes.models.json_records import described
 from scenes.models.phong_of_parts import diffuse_share, glowing, metallic_rough, scaled, seen_through
 from scenes.models.vertex_colours import coloured
 
@@ -98,6 +99,8 @@ class GltfMaterials:
         self, given: dict[str, Any], where: str, lookup: Lookup | None, tint: Texture | None, shared: Lookup | None
     ) -> Material:
         extensions = given.get("extensions", {})
+        if given.get("alphaMode", "OPAQUE") not in ("OPAQUE", "MASK", "BLEND"):
+            self.report.add(where, f"an opacity of mode {described(given['alphaMode'])}", "opaque")
         for name in sorted(extensions.keys() - (_USED | (ALONG_PATHS if self._facets else set()))):
             self.report.add(where, name)
         for name in () if self._facets else ("normalTexture", "occlusionTexture"):

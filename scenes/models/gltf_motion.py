@@ -15,7 +15,7 @@ from scenes.animation import continuous_quaternions
 from scenes.arithmetic import rotation_between
 from scenes.formats.losses import LossReport
 from scenes.models.gltf_data import GltfData
-from scenes.models.json_records import misplaced
+from scenes.models.json_records import misplaced, require
 from scenes.models.motion import Poses, uniform_times
 
 _REST = {"translation": (0.0, 0.0, 0.0), "rotation": (0.0, 0.0, 0.0, 1.0), "scale": (1.0, 1.0, 1.0)}
@@ -36,6 +36,10 @@ def local_poses(values: dict[str, Any], count: int = 1) -> Poses:
     return found
 
 
+_Channel = tuple[NDArray[np.float64], NDArray[np.float64], str, str]
+"""Times of keys, their values, the interpolation, and the JSON path of the sampler."""
+
+
 class GltfMotion:
     """The first animation of a file, at uniform times.
 
@@ -50,31 +54,34 @@ class GltfMotion:
             SceneError: a channel cannot be read, or the motion needs more than 65,536 keys.
         """
         self.data, self.report, stem = data, report, data.sources.path.stem
-        self._channels: dict[int, dict[str, tuple[NDArray, NDArray, str]]] = {}
-        animations = data.items("animations")
-        if len(animations) > 1:
-            report.add(stem, f"animations after the first ({len(animations) - 1})")
-        for number, channel in enumerate(animations[0].get("channels", ()) if animations else ()):
+        self._channels: dict[int, dict[str, _Channel]] = {}
+        count = len(data.items("animations"))
+        if count > 1:
+            report.add(stem, f"animations after the first ({count - 1})")
+        animation = data.at("animations", 0) if count else {}
+        for number, channel in enumerate(animation.get("channels", ())):
             target = channel["target"]
             if "node" not in target or target.get("path") not in _REST:
                 report.add(stem, f"an animation of {target.get('path', 'nothing')}")
                 continue
-            samplers = animations[0].get("samplers", ())
+            samplers = animation.get("samplers", ())
             if channel["sampler"] >= len(samplers):
                 place = f"animations[0].channels[{number}].sampler"
                 raise misplaced(place, f"an index of samplers below {len(samplers)}", channel["sampler"])
             read = self._sampler(samplers[channel["sampler"]], target["path"], channel["sampler"])
             self._channels.setdefault(target["node"], {})[target["path"]] = read
-        spans = [keys for channels in self._channels.values() for keys, _, _ in channels.values()]
+        spans = [keys for channels in self._channels.values() for keys, *_ in channels.values()]
         self.times_s = uniform_times(max((float(keys[-1]) for keys in spans), default=0.0), "animations[0]")
 
-    def _sampler(self, sampler: dict[str, Any], path: str, number: int) -> tuple[NDArray, NDArray, str]:
-        """Keys, values and interpolation of a sampler.
+    def _sampler(self, sampler: dict[str, Any], path: str, number: int) -> _Channel:
+        """Keys, values and interpolation of a sampler, and its JSON path.
 
         Raises:
             SceneError: they do not belong together.
         """
-        place, kind = f"animations[0].samplers[{number}]", sampler.get("interpolation", "LINEAR")
+        place = f"animations[0].samplers[{number}]"
+        require(sampler, self.data.records.sampler, place)
+        kind = sampler.get("interpolation", "LINEAR")
         keys = self.data.numbers(sampler["input"], "times", ("SCALAR",))[:, 0]
         values = self.data.numbers(sampler["output"], f"a {path}", ("VEC4" if path == "rotation" else "VEC3",))
         each = 3 if kind == "CUBICSPLINE" else 1
@@ -86,7 +93,7 @@ class GltfMotion:
             raise misplaced(f"{place}.input", "times that increase", "one that does not")
         if path == "rotation" and not values[each // 2 :: each].any(axis=1).all():
             raise misplaced(f"{place}.output", "quaternions other than zero", "zero")
-        return keys, values, kind
+        return keys, values, kind, place
 
     def poses(self, number: int) -> Poses | None:
         """Transforms from a node to its parent at all times; None if it does not move."""
@@ -94,12 +101,17 @@ class GltfMotion:
         if channels is None or not len(self.times_s):
             return None
         node = self.data.at("nodes", number)
-        moved = {path: _sampled(path, *channel, self.times_s) for path, channel in channels.items()}
+        moved = {path: _sampled(path, channel, self.times_s) for path, channel in channels.items()}
         return local_poses({name: value for name, value in node.items() if name != "matrix"} | moved, len(self.times_s))
 
 
-def _sampled(path: str, keys: NDArray, values: NDArray, kind: str, times_s: NDArray) -> NDArray:
-    """Values of a channel at times; the first and last keys hold beyond them."""
+def _sampled(path: str, channel: _Channel, times_s: NDArray) -> NDArray:
+    """Values of a channel at times; the first and last keys hold beyond them.
+
+    Raises:
+        SceneError: a spline of quaternions goes through zero.
+    """
+    keys, values, kind, place = channel
     at = np.clip(times_s, keys[0], keys[-1])
     low = np.clip(np.searchsorted(keys, at, side="right") - 1, 0, max(len(keys) - 2, 0))
     if kind == "STEP":
@@ -114,7 +126,12 @@ def _sampled(path: str, keys: NDArray, values: NDArray, kind: str, times_s: NDAr
         rest = 1.0 - u
         found = rest * rest * (1.0 + 2.0 * u) * values[low, 1] + u * u * (1.0 + 2.0 * rest) * values[low + 1, 1]
         found = found + span * u * rest * (rest * values[low, 2] - u * values[low + 1, 0])
-        return found / np.linalg.norm(found, axis=1, keepdims=True) if path == "rotation" else found
+        if path != "rotation":
+            return found
+        norms = np.linalg.norm(found, axis=1, keepdims=True)
+        if not (norms > 0.0).all():
+            raise misplaced(f"{place}.output", "a spline of quaternions other than zero", "one through zero")
+        return found / norms
     share = (at - keys[low]) / (keys[low + 1] - keys[low])
     if path == "rotation":
         values = continuous_quaternions(values / np.linalg.norm(values, axis=1, keepdims=True))

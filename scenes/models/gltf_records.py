@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from scenes.models.json_records import Check, flag, index, items, named, number, numbers, one_of, record, text, whole
+from scenes.models.json_records import Check, flag, index, items, number, numbers, one_of, record, text, whole
 
 COMPONENTS = {5120: "<i1", 5121: "<u1", 5122: "<i2", 5123: "<u2", 5125: "<u4", 5126: "<f4"}
 """Types of the components of accessors."""
@@ -15,27 +15,43 @@ COMPONENTS = {5120: "<i1", 5121: "<u1", 5122: "<i2", 5123: "<u2", 5125: "<u4", 5
 WIDTHS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4, "MAT2": 4, "MAT3": 9, "MAT4": 16}
 """Components of an element of an accessor."""
 
+_ATTRIBUTES = ("POSITION", "NORMAL", "COLOR_0",
+               *(f"{name}_{place}" for name in ("TEXCOORD", "JOINTS", "WEIGHTS") for place in range(4)))  # fmt: skip
+_LENSES = {"perspective": record({"yfov": number}, aspectRatio=number),
+           "orthographic": record({"xmag": number, "ymag": number})}  # fmt: skip
 _LISTS = ("accessors", "bufferViews", "buffers", "cameras", "images", "materials", "meshes", "nodes", "samplers",
           "scenes", "skins", "textures")  # fmt: skip
 
 
-class _Records:
-    """The records of a file, whose indices lie within its lists."""
+WHOLE = record(
+    **{name: items(record()) for name in (*_LISTS, "animations")}, scene=whole(), extensionsUsed=items(text),
+    extensionsRequired=items(text), extensions=record(KHR_lights_punctual=record(lights=items(record()))),
+)  # fmt: skip
+"""A file, whose objects are checked when they are used: what a picture does not need may be of later versions."""
 
-    def __init__(self, counts: dict[str, int]) -> None:
-        self._indices = {name: index(name, count) for name, count in counts.items()}
+LIGHT = record({"type": text}, color=numbers(3), intensity=number,
+               spot=record(innerConeAngle=number, outerConeAngle=number))  # fmt: skip
+"""A light of the extension KHR_lights_punctual."""
+
+
+class Records:
+    """The records of a checked file, whose indices lie within its lists.
+
+    Attributes:
+        of: what an object of each list must be, by the name of the list.
+        sampler: what the sampler of an animation must be.
+    """
+
+    def __init__(self, json: dict[str, Any]) -> None:
+        self._indices = {name: index(name, len(json.get(name, ()))) for name in _LISTS}
+        self.of: dict[str, Check] = {**self._data(), **self._pictures(), **self._scene()}
+        accessor = self.at("accessors")
+        self.sampler = record({"input": accessor, "output": accessor},
+                              interpolation=one_of("LINEAR", "STEP", "CUBICSPLINE"))  # fmt: skip
 
     def at(self, name: str) -> Check:
+        """What an index of a list must be."""
         return self._indices[name]
-
-    def whole(self) -> Check:
-        made: dict[str, Check] = {**self._data(), **self._pictures(), **self._scene()}
-        lists = {name: items(item) for name, item in made.items()}
-        names = items(text)
-        return record(
-            **lists, scene=whole(), extensionsUsed=names, extensionsRequired=names,
-            extensions=record(KHR_lights_punctual=record(lights=items(_light()))),
-        )  # fmt: skip
 
     def _data(self) -> dict[str, Check]:
         view, kind = self.at("bufferViews"), one_of(*COMPONENTS)
@@ -70,7 +86,7 @@ class _Records:
         )
         material = record(
             name=text, pbrMetallicRoughness=rough, normalTexture=info["scaled"], emissiveTexture=info[""],
-            emissiveFactor=numbers(3), alphaMode=one_of("OPAQUE", "MASK", "BLEND"), alphaCutoff=number,
+            emissiveFactor=numbers(3), alphaMode=text, alphaCutoff=number,
             doubleSided=flag, extensions=extensions,
         )  # fmt: skip
         return {
@@ -89,21 +105,15 @@ class _Records:
 
     def _scene(self) -> dict[str, Check]:
         accessor, node, camera = self.at("accessors"), self.at("nodes"), self.at("cameras")
+        attributes = record(**dict.fromkeys(_ATTRIBUTES, accessor))
         primitive = record(
-            {"attributes": named(accessor)},
-            indices=accessor, material=self.at("materials"), mode=whole(0, 6), targets=items(named(accessor)),
+            {"attributes": attributes}, indices=accessor, material=self.at("materials"), mode=whole(0, 6)
         )  # fmt: skip
         light = record({"light": whole()})
-        sampler = record({"input": accessor, "output": accessor},
-                         interpolation=one_of("LINEAR", "STEP", "CUBICSPLINE"))  # fmt: skip
         channel = record({"sampler": whole(), "target": record(node=node, path=text)})
         return {
-            "animations": record(channels=items(channel), samplers=items(sampler)),
-            "cameras": record(
-                name=text, type=one_of("perspective", "orthographic"),
-                perspective=record({"yfov": number}, aspectRatio=number),
-                orthographic=record({"xmag": number, "ymag": number}),
-            ),
+            "animations": record(channels=items(channel), samplers=items(record())),
+            "cameras": _camera,
             "meshes": record(name=text, primitives=items(primitive)),
             "nodes": record(
                 name=text, children=items(node), mesh=self.at("meshes"), skin=self.at("skins"), camera=camera,
@@ -115,12 +125,8 @@ class _Records:
         }  # fmt: skip
 
 
-def _light() -> Check:
-    spot = record(innerConeAngle=number, outerConeAngle=number)
-    return record({"type": text}, color=numbers(3), intensity=number, spot=spot)
-
-
-def record_of(json: dict[str, Any]) -> Check:
-    """What an object of this many nodes, meshes and the like must be."""
-    counts = {name: len(json[name]) if isinstance(json.get(name), list) else 0 for name in _LISTS}
-    return _Records(counts).whole()
+def _camera(value: Any) -> None:
+    """A camera with the lens of its type."""
+    record(name=text, type=one_of(*_LENSES))(value)
+    kind = value.get("type", "perspective")
+    record(**{kind: _LENSES[kind]})(value)

@@ -24,7 +24,8 @@ from scenes.canonical import (
 from scenes.formats.appearance.spectra import rgb
 from scenes.formats.losses import LossReport
 from scenes.models.gltf_data import GltfData
-from scenes.models.json_records import misplaced
+from scenes.models.gltf_records import LIGHT
+from scenes.models.json_records import misplaced, require
 from scenes.models.model import ModelCamera, axis_of, shorter_fov_deg, unscaled
 
 _SHARP = 1e-6  # relative width of the edge of a spot that has none
@@ -55,18 +56,20 @@ def camera_at_node(data: GltfData, number: int, matrix: Matrix, track: RigidTrac
 
 
 def light_at_node(data: GltfData, number: int, matrix: Matrix, where: str, report: LossReport) -> Light | None:
-    """A light of the extension KHR_lights_punctual at a node with this transform.
+    """The light of the extension KHR_lights_punctual at the node of this number with this transform.
 
     Spots fall off as ``x²`` in the cosine, as the extension recommends.
 
     Raises:
-        SceneError: there is no such light.
+        SceneError: there is no such light, or one of its values is not what the extension has there.
     """
     lights = data.json.get("extensions", {}).get("KHR_lights_punctual", {}).get("lights", [])
-    place = "extensions.KHR_lights_punctual.lights"
-    if number >= len(lights):
-        raise misplaced(f"node {where}", f"an index of {place} below {len(lights)}", number)
-    given = lights[number]
+    chosen = data.at("nodes", number)["extensions"]["KHR_lights_punctual"]["light"]
+    if chosen >= len(lights):
+        named = f"nodes[{number}].extensions.KHR_lights_punctual.light"
+        raise misplaced(named, f"an index of lights below {len(lights)}", chosen)
+    given, place = lights[chosen], f"extensions.KHR_lights_punctual.lights[{chosen}]"
+    require(given, LIGHT, place)
     color = np.asarray(given.get("color", (1.0, 1.0, 1.0)), np.float64) * float(given.get("intensity", 1.0))
     strength, kind = rgb(np.maximum(color, 0.0)), given["type"]
     if "range" in given:
@@ -84,7 +87,7 @@ def light_at_node(data: GltfData, number: int, matrix: Matrix, where: str, repor
     inner_deg = math.degrees(float(spot.get("innerConeAngle", 0.0)))
     if not (0.0 <= inner_deg and 0.0 < outer_deg <= 90.0 + 1e-5):
         got = f"{math.radians(inner_deg):g} and {math.radians(outer_deg):g}"
-        raise misplaced(f"{place}[{number}].spot", "cone angles 0 <= inner and 0 < outer <= π/2", got)
+        raise misplaced(f"{place}.spot", "cone angles 0 <= inner and 0 < outer <= π/2", got)
     if inner_deg >= outer_deg:
         report.add(where, "a spot whose inner cone is as wide as its outer cone", "one that is slightly narrower")
         inner_deg = outer_deg * (1.0 - _SHARP)

@@ -39,8 +39,8 @@ class Misfit(Exception):
         return self
 
 
-def require(value: Any, check: Check) -> None:
-    """Checks a value.
+def require(value: Any, check: Check, place: str = "") -> None:
+    """Checks a value, at a JSON path within its file.
 
     Raises:
         SceneError: it does not fit; the message has the path, what was expected and what arrived.
@@ -48,8 +48,8 @@ def require(value: Any, check: Check) -> None:
     try:
         check(value)
     except Misfit as misfit:
-        place = misfit.place.removeprefix(".") or "the file"
-        raise misplaced(place, misfit.expected, described(misfit.value)) from None
+        found = (place + misfit.place).removeprefix(".") or "the file"
+        raise misplaced(found, misfit.expected, described(misfit.value)) from None
 
 
 def misplaced(place: str, expected: str, got: object) -> SceneError:
