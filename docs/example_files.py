@@ -84,12 +84,12 @@ def main(folder: Path) -> None:
     output.open(str(folder / "sky.hdr"), oiio.ImageSpec(picture.shape[1], picture.shape[0], 3, oiio.FLOAT))
     output.write_image(picture)
     output.close()
-    (folder / "keys.csv").write_text(KEYS)
-    (folder / "quads.mtl").write_text(QUADS_MTL)
-    (folder / "quads.obj").write_text(_quads(0.0))
-    (folder / "far.obj").write_text(_quads(4_500_000.0))
+    (folder / "keys.csv").write_text(KEYS, encoding="utf-8")
+    (folder / "quads.mtl").write_text(QUADS_MTL, encoding="utf-8")
+    (folder / "quads.obj").write_text(_quads(0.0), encoding="utf-8")
+    (folder / "far.obj").write_text(_quads(4_500_000.0), encoding="utf-8")
     (folder / "large.ply").write_bytes(_large())
-    (folder / "trials.csv").write_text(_trials())
+    (folder / "trials.csv").write_text(_trials(), encoding="utf-8")
 
 
 if __name__ == "__main__":

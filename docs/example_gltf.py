@@ -148,7 +148,7 @@ def write_model(folder: Path, name: str, model: Model) -> Path:
     file["materials"] = [material]
     model.change(file, accessor)
     path = folder / f"{name}.gltf"
-    path.write_text(json.dumps(file))
+    path.write_text(json.dumps(file), encoding="utf-8")
     return path
 
 

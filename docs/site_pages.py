@@ -58,7 +58,7 @@ def on_files(files: Files, config: MkDocsConfig) -> Files:
     listed = "".join(f"- [{name}]({pages[name].removeprefix('reference/')})\n" for name in PACKAGES)
     files.append(File.generated(config, "reference/index.md", content=f"# Reference\n\n{listed}"))
     for page, source in COPIES.items():
-        files.append(File.generated(config, page, content=(ROOT / source).read_text()))
+        files.append(File.generated(config, page, content=(ROOT / source).read_text(encoding="utf-8")))
     return files
 
 

@@ -9,6 +9,7 @@ import pytest
 from hypothesis import settings
 
 from tests import shapes
+from tsar.memory import core_count
 
 # Tensors are small here: threads of torch cost more than they save, and on a busy machine wait for one another for most
 # of the time. No result depends on their number, which has tests of its own. Processes that tests start inherit this.
@@ -30,7 +31,7 @@ WORKER_BYTES = 3 << 30
 @pytest.hookimpl(optionalhook=True)
 def pytest_xdist_auto_num_workers() -> int:
     """As many processes as there are cores, and memory for."""
-    return max(1, min(len(os.sched_getaffinity(0)), psutil.virtual_memory().available // WORKER_BYTES))
+    return max(1, min(core_count(), psutil.virtual_memory().available // WORKER_BYTES))
 
 
 @pytest.hookimpl(wrapper=True)

@@ -7,16 +7,14 @@ import os
 from collections.abc import Iterator
 from pathlib import Path
 
-try:
-    import resource
-except ModuleNotFoundError:  # Windows
-    resource = None
+import psutil
 
 
 def core_count() -> int:
-    """Number of CPU cores this process may use; all cores of the machine where the system does not report it."""
-    if hasattr(os, "sched_getaffinity"):
-        return len(os.sched_getaffinity(0))
+    """Number of CPU cores this process may use; all cores of the machine on macOS, which has no affinity."""
+    process = psutil.Process()
+    if hasattr(process, "cpu_affinity"):
+        return len(process.cpu_affinity() or ())
     return os.cpu_count() or 1
 
 
@@ -24,35 +22,21 @@ def free_memory_bytes(root: Path = Path("/")) -> int:
     """Bytes that can be allocated. The page cache counts as free, because the system releases it on demand.
 
     Args:
-        root: directory that contains ``proc`` and ``sys``.
+        root: directory that contains the ``proc`` and ``sys`` of control groups.
     """
-    found = [*_machine(root), *_control_groups(root), *_process(root)]
-    return max(0, min(found) if found else _whole())
+    return max(0, min([psutil.virtual_memory().available, *_control_groups(root), *_process()]))
 
 
-def _whole() -> int:
-    """Total memory of the machine, bytes, for systems that do not report free memory; 2^62 where it is unknown too."""
-    try:
-        return os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
-    except (AttributeError, ValueError, OSError):
-        return 1 << 62
-
-
-def _machine(root: Path) -> Iterator[int]:
-    for name, value in _table(root / "proc/meminfo"):
-        if name == "MemAvailable:":
-            yield value * 1024
-
-
-def _process(root: Path) -> Iterator[int]:
-    """Bytes left by ``ulimit -v`` and by ``ulimit -d``."""
-    if resource is None:
+def _process() -> Iterator[int]:
+    """Bytes left by ``ulimit -v`` and by ``ulimit -d``. macOS does not enforce the first, and Windows has neither."""
+    process = psutil.Process()
+    if not hasattr(process, "rlimit"):
         return
-    used = dict(_table(root / "proc/self/status"))
-    for limit, name in ((resource.RLIMIT_AS, "VmSize:"), (resource.RLIMIT_DATA, "VmData:")):
-        most, _ = resource.getrlimit(limit)
-        if most != resource.RLIM_INFINITY and name in used:
-            yield most - used[name] * 1024
+    used = process.memory_info()
+    for limit, held in ((psutil.RLIMIT_AS, used.vms), (psutil.RLIMIT_DATA, used.data)):
+        most, _ = process.rlimit(limit)
+        if most != psutil.RLIM_INFINITY:
+            yield most - held
 
 
 def _control_groups(root: Path) -> Iterator[int]:
@@ -88,6 +72,6 @@ def _table(path: Path) -> Iterator[tuple[str, int]]:
 
 def _lines(path: Path) -> list[str]:
     try:
-        return path.read_text().splitlines()
+        return path.read_text(encoding="utf-8").splitlines()
     except OSError:
         return []

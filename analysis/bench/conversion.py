@@ -96,7 +96,7 @@ def relief(side: int) -> tuple[np.ndarray, np.ndarray]:
 def write_text_scene(path: Path, megabytes: float) -> int:
     """Writes a PBRT scene of about the given size with one mesh inside the file; returns the size in bytes."""
     points, faces = relief(max(8, int((megabytes * 1e6 / 72.0) ** 0.5)))
-    with path.open("w") as file:
+    with path.open("w", encoding="utf-8") as file:
         file.write(f'{_HEAD}Shape "trianglemesh" "integer indices" [')
         np.savetxt(file, faces, fmt="%d")
         file.write('] "point P" [')
@@ -111,7 +111,7 @@ def write_mesh_scene(path: Path, megabytes: float) -> int:
 
     mesh = path.with_suffix(".ply")
     mesh.write_bytes(ply_bytes(Mesh(*relief(int((megabytes * 1e6 / 38.0) ** 0.5)))))
-    path.write_text(f'{_HEAD}Shape "plymesh" "string filename" "{mesh.name}"\nWorldEnd\n')
+    path.write_bytes(f'{_HEAD}Shape "plymesh" "string filename" "{mesh.name}"\nWorldEnd\n'.encode())
     return mesh.stat().st_size + path.stat().st_size
 
 
@@ -136,7 +136,7 @@ def _memory_row(kind: str, work: Path) -> Row:
     begin = time.perf_counter()
     root = Path(__file__).resolve().parents[2]
     command = [sys.executable, "-c", _PEAK, str(path), str(work / "out" / "scene.xml")]
-    done = subprocess.run(command, cwd=root, capture_output=True, text=True, check=True)
+    done = subprocess.run(command, cwd=root, capture_output=True, encoding="utf-8", check=True)
     seconds = time.perf_counter() - begin
     peak = float(done.stdout.split()[-1])
     name = f"peak memory of {LARGE_MB} MB as {'text' if kind == 'text' else 'a mesh file'}, over its size"

@@ -23,7 +23,7 @@ from analysis.bench.threads import cores, hits, order
 from analysis.command import progress
 from analysis.command.cli import bad_input, full_disk
 from analysis.command.console import markdown
-from analysis.storage.files import atomic, write_json
+from analysis.storage.files import write_json, write_text
 from analysis.storage.results import own_results
 from analysis.storage.summary import with_source
 
@@ -80,8 +80,7 @@ def run_bench(options: BenchOptions) -> dict[str, Any]:
             rows += MEASURED_BY[name](options, bars)
             found = {**place, "rows": [row.record() for row in rows]}
             write_json(options.out / f"bench{ending}.json", found)
-        with atomic(options.out / TABLES) as file:
-            file.write_text(markdown(group_tables(found)), encoding="utf-8")
+        write_text(options.out / TABLES, markdown(group_tables(found)))
         write_json(summary, _summary(options, rows))
     return found
 

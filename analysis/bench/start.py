@@ -58,7 +58,7 @@ def start(environment: Mapping[str, str], *arguments: str) -> Started:
     """
     command = [sys.executable, str(ROOT / "scripts" / arguments[0]), *arguments[1:]]
     begin = time.perf_counter()
-    done = subprocess.run(command, cwd=ROOT, env={**os.environ, **environment}, capture_output=True, text=True)
+    done = subprocess.run(command, cwd=ROOT, env={**os.environ, **environment}, capture_output=True, encoding="utf-8")
     seconds = time.perf_counter() - begin
     if done.returncode:
         raise InputError(f"{' '.join(arguments[:2])}: ended with {done.returncode}: {done.stderr.strip()[-300:]}")

@@ -33,7 +33,7 @@ def _taken(path: Path, what: str) -> TextIO:
     while True:
         file = path.open("a+", encoding="utf-8")
         if not lock_descriptor(file.fileno(), blocking=False):
-            file.seek(0)
+            file.seek(1)  # on Windows nobody else may read the first byte, which is locked
             owner = " ".join(file.read(300).split()) or "another process"
             file.close()
             raise ValueError(f"{what}: {path.parent} is in use by {owner}") from None
@@ -42,7 +42,7 @@ def _taken(path: Path, what: str) -> TextIO:
         file.close()  # its last owner removed it in the meantime
     now, command = time.strftime("%Y-%m-%d %H:%M:%S"), " ".join(sys.argv)[:160]
     file.truncate(0)
-    file.write(f"process {os.getpid()} on {socket.gethostname()} since {now}: {command}\n")
+    file.write(f" process {os.getpid()} on {socket.gethostname()} since {now}: {command}\n")
     file.flush()
     return file
 
@@ -80,7 +80,12 @@ def release_folder(path: Path) -> None:
     """Releases a folder, if this process owns it."""
     folder = path.resolve()
     if folder in _owned_folders:
-        with _owned_folders.pop(folder), suppress(OSError):
+        with suppress(OSError):
+            with _owned_folders.pop(folder):
+                try:
+                    return (folder / _OWNER).unlink()
+                except PermissionError:
+                    pass  # Windows keeps a file that is open
             (folder / _OWNER).unlink()
 
 

@@ -22,7 +22,7 @@ _START_FIELD = 22 - 3  # index among the fields after the name: clock ticks from
 def process_began_s() -> float:
     """Start of this process on the clock of :func:`time.monotonic`, seconds, to within 10 ms."""
     try:
-        ticks = int(_STAT.read_text().rpartition(")")[2].split()[_START_FIELD])
+        ticks = int(_STAT.read_text(encoding="utf-8").rpartition(")")[2].split()[_START_FIELD])
         age_s = time.clock_gettime(time.CLOCK_BOOTTIME) - ticks / os.sysconf("SC_CLK_TCK")
     except (OSError, AttributeError):  # not Linux: there psutil is as exact; on Linux it knows whole seconds only
         import psutil

@@ -181,7 +181,7 @@ def marker_offsets(
             text, ending = native(source, size)
             work.mkdir(parents=True, exist_ok=True)
             file = work / f"native{ending}"
-            file.write_text(text)
+            file.write_bytes(text.encode())
             kept = {"from": source, "film": shape}
             program = {"luxrender": "luxcore", "mitsuba": "mitsuba"}.get(source)
             if program:

@@ -79,7 +79,7 @@ def sources_in(folder: Path, scenes: tuple[Path, ...], root: Path | None) -> lis
     made.append(folder / "newer.json")
     tree = {"type": "scene", "sensor": {"type": "perspective"}, "ball": {"type": "sphere", "radius": 2.0}}
     tree["floor"] = {"type": "rectangle", "bsdf": {"type": "diffuse", "reflectance": {"type": "rgb", "value": 0.5}}}
-    made[-1].write_text(json.dumps(tree))
+    made[-1].write_text(json.dumps(tree), encoding="utf-8")
     return made
 
 

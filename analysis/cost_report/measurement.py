@@ -7,7 +7,6 @@ imported when a measurement begins.
 from __future__ import annotations
 
 import math
-import os
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import islice
@@ -77,10 +76,11 @@ def prepare(options: MeasurementOptions) -> tuple[Scene, dict[int, Renderer]]:
 
 def measure(options: MeasurementOptions, ready: tuple[Scene, Mapping[int, Renderer]], bars: Bars) -> Measurement:
     """Watches memory first, before other settings fill it, and then measures every setting."""
+    import psutil
     import torch
 
     scene, found = ready
-    load, memory = os.getloadavg()[0], None
+    load, memory = psutil.getloadavg()[0], None
     if options.memory_cycles:
         renderer, task = found[options.measured_resolution], bars.task("memory", options.memory_cycles)
         memory = watch_memory(options, renderer, scene.duration_s, task)

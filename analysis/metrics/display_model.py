@@ -47,5 +47,5 @@ def srgb_displays() -> tuple[str, ...]:
     """Names of the displays of ColorVideoVDP that show sRGB; it has others, to which our codes mean another light."""
     package = importlib.util.find_spec("pycvvdp")
     folder = Path(((package and package.submodule_search_locations) or [""])[0])
-    found = json.loads((folder / "vvdp_data" / "display_models.json").read_text())
+    found = json.loads((folder / "vvdp_data" / "display_models.json").read_text(encoding="utf-8"))
     return tuple(name for name, display in found.items() if display.get("colorspace", "sRGB") == "sRGB")

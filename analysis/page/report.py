@@ -16,7 +16,7 @@ from analysis.page.comparer import Comparer, block, source
 from analysis.page.curves import drawing, letters_of
 from analysis.page.environment import environment
 from analysis.page.explorer import Explorer
-from analysis.storage.files import atomic
+from analysis.storage.files import write_text
 
 STYLE = Path(__file__).with_name("report.css")
 
@@ -48,9 +48,7 @@ class Report:
 
 def write_report(path: Path, report: Report) -> None:
     """Writes the page atomically."""
-    text = render(report)
-    with atomic(path) as temporary:
-        temporary.write_text(text, encoding="utf-8")
+    write_text(path, render(report))
 
 
 def render(report: Report) -> str:

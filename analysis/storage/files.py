@@ -41,8 +41,16 @@ def atomic(path: Path) -> Iterator[Path]:
 
 
 def sync(path: Path) -> None:
-    """Flushes the content of a file, or the names in a folder, to the disk."""
-    handle = os.open(path, os.O_RDONLY)
+    """Flushes the content of a file, or the names in a folder, to the disk.
+
+    Windows flushes only files that are open for writing, and no folders, whose names it keeps in a log of its own.
+    """
+    try:
+        handle = os.open(path, os.O_RDONLY if path.is_dir() else os.O_RDWR)
+    except PermissionError:
+        if path.is_dir():
+            return
+        raise
     try:
         os.fsync(handle)
     finally:
@@ -52,13 +60,14 @@ def sync(path: Path) -> None:
 @contextmanager
 def locked(path: Path) -> Iterator[None]:
     """Holds a lock that the system releases even if this process is killed."""
-    with path.open("w") as file:
+    with path.open("ab") as file:
         lock_descriptor(file.fileno())
         yield
 
 
 def plain(value: Any) -> Any:
-    """A value in types of JSON: infinities become the strings ``"inf"`` and ``"-inf"``, NaN becomes null."""
+    """A value in types of JSON: infinities become the strings ``"inf"`` and ``"-inf"``, NaN becomes null, and
+    a path has forward slashes."""
     if is_dataclass(value) and not isinstance(value, type):
         return plain(asdict(value))
     if isinstance(value, Mapping):
@@ -70,7 +79,7 @@ def plain(value: Any) -> Any:
     if isinstance(value, float) and not math.isfinite(value):
         return None if math.isnan(value) else ("inf" if value > 0 else "-inf")
     if isinstance(value, Path):
-        return str(value)
+        return value.as_posix()
     if value is None or isinstance(value, (str, int, float, bool)):
         return value
     raise TypeError(f"plain: cannot write a {type(value).__name__} to JSON")
@@ -78,12 +87,16 @@ def plain(value: Any) -> Any:
 
 def write_json(path: Path, value: Any) -> None:
     """Writes valid JSON atomically."""
-    text = json.dumps(plain(value), indent=1, allow_nan=False)
+    write_text(path, json.dumps(plain(value), indent=1, allow_nan=False) + "\n")
+
+
+def write_text(path: Path, text: str) -> None:
+    """Writes text atomically: the same bytes on every system, in UTF-8 and with the line ends of ``text``."""
     with atomic(path) as temporary:
-        temporary.write_text(text + "\n", encoding="utf-8")
+        temporary.write_bytes(text.encode())
 
 
 def write_table(path: Path, rows: pd.DataFrame) -> None:
     """Writes a data frame as CSV, atomically."""
     with atomic(path) as temporary:
-        rows.to_csv(temporary, index=False)
+        rows.to_csv(temporary, index=False, lineterminator="\n")

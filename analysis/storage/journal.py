@@ -6,6 +6,7 @@ import hashlib
 import json
 import os
 import sys
+import time
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, BinaryIO
@@ -18,6 +19,8 @@ _CHECK_BYTES = 8
 _LINE_CHECK = 2 * _CHECK_BYTES
 _POLL_S = 0.005
 """Seconds between attempts of a process that waits for its turn: about as long as an append takes."""
+_LOCKED_S = 10.0
+"""Seconds after which a reader gives up waiting for a process that appends."""
 
 
 def warn(line: str) -> None:
@@ -46,7 +49,7 @@ class Journal:
                 if (found.st_dev, found.st_ino) != self._file or found.st_size < self._read:
                     self._rows, self._read, self._file = [], 0, (found.st_dev, found.st_ino)
                 file.seek(self._read)
-                fresh = file.read()
+                fresh = _read_past_locks(file)
         except FileNotFoundError:
             self._rows, self._read, self._file = [], 0, None
             return []
@@ -81,6 +84,18 @@ class Journal:
 def _last_byte(file: BinaryIO) -> bytes:
     file.seek(-1, os.SEEK_END)
     return file.read(1)
+
+
+def _read_past_locks(file: BinaryIO) -> bytes:
+    """The rest of a file. On Windows a process that appends keeps others from the first byte, for milliseconds."""
+    until_s = time.monotonic() + _LOCKED_S
+    while True:
+        try:
+            return file.read()
+        except PermissionError:
+            if time.monotonic() > until_s:
+                raise
+            time.sleep(_POLL_S)
 
 
 def _check(body: bytes) -> bytes:

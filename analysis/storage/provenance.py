@@ -57,7 +57,7 @@ def provenance(config: Any, added: Sequence[Brought] = (), **extra: Any) -> dict
 def cpu_model() -> str:
     """Name of the processor as the operating system reports it."""
     try:
-        with _CPU_INFO.open() as lines:
+        with _CPU_INFO.open(encoding="utf-8") as lines:
             for line in lines:
                 if line.startswith("model name"):
                     return line.partition(":")[2].strip()
@@ -71,7 +71,7 @@ def _git(*arguments: str) -> str | None:
     if not (_ROOT / ".git").exists():  # a checkout of another project may lie above an installed package
         return None
     try:
-        done = subprocess.run(["git", "-C", str(_ROOT), *arguments], capture_output=True, text=True, timeout=10)
+        done = subprocess.run(["git", "-C", str(_ROOT), *arguments], capture_output=True, encoding="utf-8", timeout=10)
     except (OSError, subprocess.TimeoutExpired):
         return None
     return done.stdout.strip() if done.returncode == 0 else None

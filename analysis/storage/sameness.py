@@ -80,7 +80,7 @@ def _compare(first: Path, second: Path, ignore: tuple[str, ...]) -> Iterator[str
         return
     left_out = {*MEASURED, *ignore}
     if first.suffix == ".json":
-        yield from _of_values(json.loads(first.read_text()), json.loads(second.read_text()), left_out)
+        yield from _of_values(json.loads(first.read_bytes()), json.loads(second.read_bytes()), left_out)
     elif first.suffix == ".parquet":
         yield from _of_tables(first, second, left_out)
     elif first.suffix in _PICTURES:

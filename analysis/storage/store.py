@@ -139,7 +139,7 @@ class Store:
         """Makes a JSON file, with infinities and NaN as in :func:`analysis.storage.files.plain`."""
         text = json.dumps(plain(value), indent=1, allow_nan=False)
         with self.make(name) as making:
-            making.path.write_text(text + "\n", encoding="utf-8")
+            making.path.write_bytes(f"{text}\n".encode())
             making.facts |= facts
 
     def find(self, name: str) -> Entry | None:

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-import ctypes
 import sys
 from pathlib import Path
+
+import psutil
 
 _STATUS, _FORGET = Path("/proc/self/status"), Path("/proc/self/clear_refs")
 _RESIDENT_PEAK = "5"
@@ -26,10 +27,10 @@ class PeakMemory:
 
     def __enter__(self) -> PeakMemory:
         try:
-            ctypes.CDLL("libc.so.6").malloc_trim(0)
-            _FORGET.write_text(_RESIDENT_PEAK)
+            psutil.heap_trim()
+            _FORGET.write_text(_RESIDENT_PEAK, encoding="utf-8")
             self._before = _status("VmRSS")
-        except (OSError, AttributeError):  # not Linux, another C library, or no permission
+        except (OSError, AttributeError):  # not Linux, a C library without trimming, or no permission
             self._before = 0
         return self
 
@@ -43,15 +44,13 @@ def _peak() -> int:
     if _STATUS.exists():
         return _status("VmHWM")
     if sys.platform == "win32":
-        import psutil
-
         return psutil.Process().memory_info().peak_wset
-    import resource  # psutil has no peak on POSIX
+    import resource  # psutil has no peak on macOS and BSD, and on Linux none that begins anew
 
     peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
     return peak if sys.platform == "darwin" else peak * 1024  # macOS counts bytes, others KiB
 
 
 def _status(name: str) -> int:
-    lines = dict(line.split(":", 1) for line in _STATUS.read_text().splitlines())
+    lines = dict(line.split(":", 1) for line in _STATUS.read_text(encoding="utf-8").splitlines())
     return int(lines[name].split()[0]) * 1024

@@ -11,7 +11,7 @@ import pandas as pd
 
 from analysis.command.cli import full_disk, require_unbroken
 from analysis.command.console import Table, markdown, show
-from analysis.storage.files import atomic, write_json, write_table
+from analysis.storage.files import write_json, write_table, write_text
 from analysis.storage.results import SUMMARY
 from analysis.storage.summary import with_source
 from analysis.study.outcomes import Outcomes
@@ -36,8 +36,7 @@ def write_tables(out: Path, tables: Mapping[str, pd.DataFrame], shown: Sequence[
     for name, table in tables.items():
         write_table(out / "tables" / f"{name}.csv", table)
     if shown is not None:
-        with atomic(out / "tables.md") as file:
-            file.write_text(markdown(shown), encoding="utf-8")
+        write_text(out / "tables.md", markdown(shown))
 
 
 def end_study(summary: Mapping[str, Any], broken: Sequence[str], out: Path, files: str) -> None:

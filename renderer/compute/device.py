@@ -180,10 +180,16 @@ def _one_process(module: Kernels) -> Iterator[None]:
     with contextlib.ExitStack() as held:
         with contextlib.suppress(OSError):  # such as a folder of another user
             lock.parent.mkdir(parents=True, exist_ok=True)
-            file = held.enter_context(lock.open("w"))
-            held.callback(lock.unlink, missing_ok=True)
+            held.callback(_removed, lock)  # after it was closed: Windows keeps a file that is open
+            file = held.enter_context(lock.open("ab"))
             lock_descriptor(file.fileno())
         yield
+
+
+def _removed(lock: Path) -> None:
+    """Removes a lock, unless another process holds it on a system that then keeps it."""
+    with contextlib.suppress(OSError):
+        lock.unlink()
 
 
 def _name(module: Kernels) -> str:

@@ -57,7 +57,7 @@ def _texts(header: str, seen: set[str]) -> Iterator[str]:
         return
     seen.add(header)
     path = _paths()[header]
-    text = path.read_text()
+    text = path.read_text(encoding="utf-8")
     for found in _DIRECTIVE.finditer(text):
         if found["header"]:
             yield from _texts(found["header"], seen)

@@ -40,7 +40,7 @@ def instructions(code: str) -> int:
     if shutil.which("perf") is None:
         raise NotImplementedError("perf is not installed")
     command = ["perf", "stat", "-x", ",", "-e", "instructions:u", sys.executable, "-c", code]
-    done = subprocess.run(command, capture_output=True, text=True, check=True)
+    done = subprocess.run(command, capture_output=True, encoding="utf-8", check=True)
     return counted(done.stderr)
 
 

@@ -24,7 +24,7 @@ def main() -> None:
     print(f"picture: {render('pendulum', 64, point_set='r3', samples_per_pixel=8).mean():.3f}")
     with tempfile.TemporaryDirectory() as folder:
         file = Path(folder) / "two.balls"
-        file.write_text("-1 0 0 1\n1.2 0 0.5 0.8\n")
+        file.write_text("-1 0 0 1\n1.2 0 0.5 0.8\n", encoding="utf-8")
         print(f"picture of a file: {render(file, 64, samples_per_pixel=8).mean():.3f}")
 
 

@@ -11,7 +11,7 @@ from tsar_examples.material import striped
 
 def read(path, root, losses) -> Scene:
     balls = []
-    for number, line in enumerate(path.read_text().splitlines(), 1):
+    for number, line in enumerate(path.read_text(encoding="utf-8").splitlines(), 1):
         try:
             x, y, z, radius = map(float, line.split())
         except ValueError:

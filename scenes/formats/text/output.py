@@ -51,7 +51,7 @@ class Output:
                 digest.update(part)
                 file.write(part)
         name = f"{folder}/{_OF_CONTENT.sub('', _plain(stem))}-{digest.hexdigest()}{ending}"
-        partial.rename(self._work / name)
+        partial.replace(self._work / name)
         return name
 
     def mesh(self, mesh: Mesh) -> str:
@@ -95,8 +95,8 @@ class Output:
         return content
 
     def text(self, name: str, content: str) -> None:
-        """Writes a text file; the scene's own has the name of :attr:`path`."""
-        (self._work / name).write_text(content, encoding="utf-8")
+        """Writes a text file, the same bytes on every system; the scene's own has the name of :attr:`path`."""
+        (self._work / name).write_bytes(content.encode())
 
     def content(self, name: str, parts: Iterable[bytes]) -> None:
         """Writes a binary file from its parts; the scene's own has the name of :attr:`path`."""

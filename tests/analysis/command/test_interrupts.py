@@ -153,9 +153,9 @@ run_cli(main)
 
 ELSEWHERE = """
 import os, signal, sys
+import psutil  # on Linux it imports what it replaces
 for name in ("SIGALRM", "SIGKILL", "ITIMER_REAL", "setitimer", "getitimer", "pthread_sigmask"):
     delattr(signal, name)
-del os.sched_getaffinity
 sys.modules["resource"] = None
 from analysis.command.cli import run_cli
 from analysis.command.cluster import _interrupts_blocked
