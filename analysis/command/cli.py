@@ -156,6 +156,7 @@ def run_cli(main: Callable[[], None]) -> None:
     error and status 2, broken invariants with one line and status 3, Ctrl-C with one line and status 130.
     """
     _spin_briefly()
+    _encodable()
     warnings.showwarning = _one_warning
     try:
         with heeded():
@@ -226,6 +227,13 @@ def _one_warning(message: Warning | str, *_: object) -> None:
     """Prints a warning in one line, without its location in the code."""
     text = re.sub(r"\s+", " ", str(message)).strip()
     print(f"warning: {text}", file=sys.stderr)
+
+
+def _encodable() -> None:
+    """Lets streams print a question mark for a character that their encoding lacks, as code pages of Windows do."""
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, io.TextIOWrapper):
+            stream.reconfigure(errors="replace")
 
 
 def _spin_briefly() -> None:
