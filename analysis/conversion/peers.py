@@ -144,7 +144,9 @@ def rendered(
     out.unlink(missing_ok=True)
     command = [sys.executable, "-c", _PROGRAMS[program], str(file), str(out), *numbers]
     try:
-        done = subprocess.run(command, capture_output=True, encoding="utf-8", errors="replace", timeout=limit_s, check=False)
+        done = subprocess.run(
+            command, capture_output=True, encoding="utf-8", errors="replace", timeout=limit_s, check=False
+        )
     except subprocess.TimeoutExpired:
         return f"no picture within {limit_s:g} s"
     if not out.is_file():

@@ -201,7 +201,7 @@ class Engine:
             facts = {"scene": base.scene, "phase": base.phase, "camera_path": base.camera_path}
         if facts["scene"] not in catalog.SCENES and Path(facts["scene"]).suffix:
             file = (folder / facts["scene"]).resolve()
-            facts["scene"] = Path(os.path.relpath(file, path.resolve().parent)).as_posix()
+            facts["scene"] = _from(path.resolve().parent, file)
         session = self.timeline.session(self._begin if self.recording else 0, seen=seen, **facts)
         if base is not None:  # what its scene's time was at this session's
             times_s = base.interval_s * np.arange(len(base.animation_s))
@@ -264,3 +264,11 @@ def _distance(scene: Scene) -> float:
     back = pose[:3, 2] / norm(pose[:3, 2])
     found = looked_at_distance(scene, pose[:3, 3], -back)
     return found if math.isfinite(found) and found > 0.0 else 1.0
+
+
+def _from(folder: Path, file: Path) -> str:
+    """The path of a file from a folder, with forward slashes; its whole path if it lies on another drive of Windows."""
+    try:
+        return Path(os.path.relpath(file, folder)).as_posix()
+    except ValueError:
+        return file.as_posix()

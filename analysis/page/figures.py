@@ -6,6 +6,7 @@ pattern, so that a figure in grey can be read.
 
 from __future__ import annotations
 
+import io
 import itertools
 import math
 from collections.abc import Sequence
@@ -36,8 +37,11 @@ def save(figure: Figure, path: Path, dpi: int = 130) -> None:
     FigureCanvasAgg(figure)
     with atomic(path) as temporary:
         figure.savefig(temporary, dpi=dpi, format="png")
-    with atomic(path.with_suffix(".svg")) as temporary, rc_context({"svg.hashsalt": path.stem}):
-        figure.savefig(temporary, format="svg", metadata={"Date": None})
+    drawn = io.BytesIO()  # into a file, lines would end as the system has it
+    with rc_context({"svg.hashsalt": path.stem}):
+        figure.savefig(drawn, format="svg", metadata={"Date": None})
+    with atomic(path.with_suffix(".svg")) as temporary:
+        temporary.write_bytes(drawn.getvalue())
 
 
 def styles(runs: Sequence[str], own: str) -> dict[str, int]:

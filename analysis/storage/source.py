@@ -54,7 +54,7 @@ def hash_of_modules(root: Path, starts: Sequence[Path]) -> str:
     """As :func:`code_hash`, from the folder of the packages and the files of modules in them."""
     modules, libraries = _reached(root, starts)
     digest = hashlib.sha256()
-    for path in sorted({*modules, *_data(modules)}):
+    for path in sorted({*modules, *_data(modules)}, key=lambda path: path.parts):  # Windows would order without case
         content = hashlib.sha256(path.read_bytes()).hexdigest()
         digest.update(f"{path.relative_to(root).as_posix()} {content}\n".encode())
     for name in sorted(libraries):

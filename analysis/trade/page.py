@@ -77,7 +77,7 @@ def _explorer(points: pd.DataFrame, place: Resources) -> Explorer:
     own = lines(points, points["seed"] == points["seed"].min()).drop_duplicates(["input", "setting"])
     found, pictures, truths = list[PlotPoint](), dict[str, bytes](), dict[str, str]()
     for line in own.to_dict("records"):
-        key, group = line["result"], line["input"].rsplit("/", 1)[-1]
+        key, group = line["result"], Path(line["input"]).name
         if place.still(key, "shown", 0).is_file():
             pictures[key] = _webp(place.still(key, "shown", 0))
         if group not in truths and place.still(key, "reference", 0).is_file():

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -128,7 +129,7 @@ def inputs(points: pd.DataFrame) -> Figure:
         axis.set_visible(False)
     for axis, name in zip(panels.flat, names, strict=False):
         _plain(axis, "FLOPs of the run", "mean squared error")
-        axis.set_title(name.rsplit("/", 1)[-1], fontsize=10, loc="left")
+        axis.set_title(Path(name).name, fontsize=10, loc="left")
         own = lines(points, points["input"] == name)
         axis.plot(own["cost_flops"], own["mse"], "o", color=OTHER, markersize=3, alpha=0.6)
         one = lines(own, own["seed"] == own["seed"].min())

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -61,7 +62,7 @@ def front_file(points: pd.DataFrame, options: TradeOptions) -> dict[str, Any] | 
     made = {
         "scale": options.scale,
         "seconds": options.seconds,
-        "inputs": [name.rsplit("/", 1)[-1] for name in dict.fromkeys(own["input"])],
+        "inputs": [Path(name).name for name in dict.fromkeys(own["input"])],
         "seeds": sorted({int(seed) for seed in own["seed"]}),
         "ledger": options.ledger,
         "settings": len(kept),
