@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
-import importlib.util
 import logging
 import signal
 import socket
@@ -20,6 +19,7 @@ from typing import TYPE_CHECKING, Any, Literal, TypeVar
 
 from analysis.command import limits
 from analysis.command.cli import InputError
+from analysis.command.extras import has_module, installed_by
 from analysis.command.interrupts import SIGNALS
 from tsar.config import closed_choices, require
 from tsar.memory import core_count
@@ -195,8 +195,8 @@ def _reason(error: BaseException | None) -> str:
 
 def dashboard_of(client: Client) -> str:
     """One line: the address of the dashboard, or why there is none."""
-    if importlib.util.find_spec("bokeh") is None:
-        return "dashboard of Dask: none, because the package bokeh is not installed"
+    if not has_module("bokeh"):
+        return f"dashboard of Dask: none, because the package bokeh is not installed; {installed_by('study')}"
     return f"dashboard of Dask: {client.dashboard_link}"
 
 

@@ -10,7 +10,7 @@ DISTRIBUTION = "tsar-render"
 """Name under which the packages are installed; they are imported as tsar, renderer, scenes and analysis."""
 
 EXTRAS: dict[str, dict[str, str]] = {
-    "study": {"dask": "dask", "distributed": "distributed"},
+    "study": {"dask": "dask", "distributed": "distributed", "bokeh": "bokeh"},
     "search": {"optuna": "optuna"},
     "formats": {"astral": "astral", "defusedxml": "defusedxml"},
     "usd": {"pxr": "usd-core"},
@@ -19,10 +19,12 @@ EXTRAS: dict[str, dict[str, str]] = {
     "psignifit": {"psignifit": "psignifit"},
 }
 """For each extra its modules and their distributions, as in the project file."""
+DISPENSABLE = ("bokeh",)
+"""Modules without which the commands of their extras run, and say what they then lack."""
 
 
 def require_extra(*extras: str) -> None:
-    """Checks that every module of the extras can be imported, without importing them.
+    """Checks that every module of the extras that is indispensable can be imported, without importing them.
 
     Args:
         extras: names in :data:`EXTRAS`.
@@ -32,8 +34,13 @@ def require_extra(*extras: str) -> None:
     """
     for extra in extras:
         for module, distribution in EXTRAS[extra].items():
-            if importlib.util.find_spec(module) is None:
+            if module not in DISPENSABLE and not has_module(module):
                 raise InputError(_missing(distribution, extra))
+
+
+def has_module(name: str) -> bool:
+    """Whether a module can be imported, without importing it."""
+    return importlib.util.find_spec(name) is not None
 
 
 def extra_of(error: ModuleNotFoundError) -> InputError | None:
@@ -47,7 +54,10 @@ def extra_of(error: ModuleNotFoundError) -> InputError | None:
 
 
 def _missing(distribution: str, extra: str) -> str:
-    return (
-        f"expected the package {distribution}, found none; the extra '{extra}' of {DISTRIBUTION} installs it "
-        f"(in a checkout: pip install --editable '.[{extra}]')"
-    )
+    return f"expected the package {distribution}, found none; {installed_by(extra)}"
+
+
+def installed_by(extra: str) -> str:
+    """The end of a message about a package that is missing: how to install it."""
+    where = f"(in a checkout: pip install --editable '.[{extra}]')"
+    return f"the extra '{extra}' of {DISTRIBUTION} installs it {where}"

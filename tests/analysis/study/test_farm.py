@@ -8,6 +8,7 @@ import subprocess
 import sys
 import threading
 import time
+import urllib.request
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -81,16 +82,36 @@ def test_a_local_cluster_adapts_and_limits_memory() -> None:
 def test_a_local_cluster_listens_on_loopback_only() -> None:
     with connected(ClusterOptions(workers=1)) as client:
         assert client.submit(int, 3).result() == 3
-        ours = [psutil.Process(), *psutil.Process().children(recursive=True)]
-        listening = {
-            place.laddr.ip
-            for one in ours
-            for place in one.net_connections("inet")
-            if place.status == psutil.CONN_LISTEN
-        }
-        assert listening == {"127.0.0.1"}
+        assert listening_hosts() == {"127.0.0.1"}
         workers = client.scheduler_info()["workers"].values()
         assert len(workers) == 1 and all(one["host"] == "127.0.0.1" for one in workers)
+
+
+def listening_hosts() -> set[str]:
+    """Hosts at which this process and its children listen."""
+    ours = [psutil.Process(), *psutil.Process().children(recursive=True)]
+    places = [place for one in ours for place in one.net_connections("inet")]
+    return {place.laddr.ip for place in places if place.status == psutil.CONN_LISTEN}
+
+
+def test_the_dashboard_is_at_the_printed_address_on_loopback_only() -> None:
+    pytest.importorskip("bokeh")
+    lines = list[str]()
+    with connected(ClusterOptions(workers=1), lines.append):
+        (line,) = lines
+        address = line.removeprefix("dashboard of Dask: ")
+        assert address.startswith("http://127.0.0.1:") and address.endswith("/status")
+        with urllib.request.urlopen(address, timeout=60) as page:
+            assert page.status == 200 and b"bokeh" in page.read().lower()
+        assert listening_hosts() == {"127.0.0.1"}
+
+
+def test_without_a_dashboard_the_line_names_the_extra(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "bokeh", None)
+    lines = list[str]()
+    with connected(ClusterOptions(workers=1), lines.append):
+        pass
+    assert len(lines) == 1 and "bokeh is not installed; the extra 'study' of tsar-render installs it" in lines[0]
 
 
 def test_runs_whose_workers_die_fail_with_the_reason(place: Resources, monkeypatch: pytest.MonkeyPatch) -> None:
