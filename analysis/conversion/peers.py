@@ -51,7 +51,7 @@ for parent in list(root.iter()):
             node.set("type", "independent")
             node[:] = []
         elif old and node.tag == "integrator":
-            node.set("type", "volpath" if node.get("type") == "volpath" else "path")
+            node.set("type", "volpath" if node.get("type", "").startswith("volpath") else "path")
             node[:] = [part for part in node if part.get("name") == "maxDepth"]
         elif old and node.tag == "srgb":
             node.tag = "rgb"
@@ -85,7 +85,9 @@ np.save(out, np.array(mi.render(scene, spp=samples, seed=seed))[..., :3])
 )
 
 # LuxCore's pictures begin with the bottom row, and are one row too low: it takes the ray of row y from
-# height - y - 1, not from height - y. The missing row at the bottom repeats the row above it.
+# height - y - 1, not from height - y. The missing row at the bottom repeats the row above it. LuxCore 2.10 knows
+# scattering volumes of these files by another spelling than LuxRender, which it then refuses itself, and once scattered
+# light alone.
 _LUXCORE = """
 import os, sys, time, numpy as np
 import pyluxcore as lux  # after NumPy: its allocator stops a later import
@@ -93,8 +95,17 @@ file, out = sys.argv[1], os.path.abspath(sys.argv[2])
 width, height, samples, seed = map(int, sys.argv[3:])
 lux.Init()
 os.chdir(os.path.dirname(os.path.abspath(file)))
+text = open(os.path.basename(file), encoding="utf-8", errors="replace").read()
+kinds = '"homogeneous"', '"homogenous"'
+if kinds[0] in text:
+    with open(out + ".lxs", "w", encoding="utf-8") as copy:
+        copy.write(text.replace(*kinds))
 how, what = lux.Properties(), lux.Properties()
-lux.ParseLXS(os.path.basename(file), how, what)
+lux.ParseLXS(out + ".lxs" if kinds[0] in text else os.path.basename(file), how, what)
+for name in list(what.GetAllNames()):
+    if name.startswith("scene.volumes.") and what.Get(name).GetString() == "homogenous":
+        what.Set(lux.Property(name, "homogeneous"))
+        what.Set(lux.Property(name.replace(".type", ".multiscattering"), True))
 for name in list(how.GetAllNames()):
     if name.startswith("film.imagepipeline"):
         how.Delete(name)

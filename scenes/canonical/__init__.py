@@ -30,6 +30,7 @@ from scenes.canonical.materials import (
     Translucent,
     Uber,
 )
+from scenes.canonical.media import Medium
 from scenes.canonical.scene import Film, Integrator, Sampler, Scene
 from scenes.canonical.shapes import Cube, Disk, Instance, Mesh, Rectangle, Shape, Sphere
 from scenes.canonical.textures import (
@@ -45,8 +46,8 @@ from scenes.canonical.values import Matrix, Rgb, RigidTrack, SceneError, identit
 __all__ = [
     "Bumped", "Camera", "CheckerboardTexture", "ConstantTexture", "Cube", "DirectionalLight", "Disk", "Emissive",
     "EnvironmentCamera", "EnvironmentLight", "Film", "Glass", "Glossy", "HeightField", "ImageTexture", "Instance",
-    "Integrator", "Light", "Masked", "Material", "Matrix", "Matte", "Mesh", "Metal", "MetallicRough", "Mirror",
-    "MixMaterial", "MixTexture", "NormalMapped", "OrthographicCamera", "PerspectiveCamera", "Phong", "Plastic",
-    "PointLight", "RealisticCamera", "Rectangle", "Rgb", "RigidTrack", "Sampler", "ScaleTexture", "Scene", "SceneError",
-    "Shape", "Sphere", "SpotLight", "SunSky", "Texture", "Translucent", "Uber", "identity",
+    "Integrator", "Light", "Masked", "Material", "Matrix", "Matte", "Medium", "Mesh", "Metal", "MetallicRough",
+    "Mirror", "MixMaterial", "MixTexture", "NormalMapped", "OrthographicCamera", "PerspectiveCamera", "Phong",
+    "Plastic", "PointLight", "RealisticCamera", "Rectangle", "Rgb", "RigidTrack", "Sampler", "ScaleTexture", "Scene",
+    "SceneError", "Shape", "Sphere", "SpotLight", "SunSky", "Texture", "Translucent", "Uber", "identity",
 ]  # fmt: skip

@@ -12,6 +12,7 @@ from typing import Literal
 from scenes.canonical.cameras import Camera
 from scenes.canonical.lights import EnvironmentLight, Light
 from scenes.canonical.materials import Material
+from scenes.canonical.media import Medium
 from scenes.canonical.shapes import Instance
 from scenes.canonical.values import Rgb, SceneError
 
@@ -72,6 +73,7 @@ class Scene:
         materials: named materials, kept for round trips; instances refer to their materials directly.
         duration_s: length of the animation, seconds; 0 for a still.
         background: radiance for camera and mirror rays that hit nothing; None for that of the environment light.
+        medium: medium around the camera, None for vacuum. The renderer has no media.
     """
 
     camera: Camera
@@ -85,3 +87,4 @@ class Scene:
     name: str = ""
     duration_s: float = 0.0
     background: EnvironmentLight | None = None
+    medium: Medium | None = None

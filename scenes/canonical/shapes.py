@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from scenes.arithmetic import determinant
 from scenes.canonical.materials import Material
+from scenes.canonical.media import Medium
 from scenes.canonical.values import Matrix, Rgb, RigidTrack, SceneError, identity
 
 
@@ -88,6 +89,8 @@ class Instance:
             :class:`Rectangle` or :class:`Sphere`.
         emission_twosided: whether the back emits, too. The renderer's lamps do not; it is kept for conversion.
         one_sided: whether the back is black. The renderer treats both sides equally; it is kept for conversion.
+        interior, exterior: media against the normal of the surface and along it, None for vacuum. If both are None, the
+            surface is no border: the medium around it goes on behind it. The renderer has no media.
     """
 
     shape: Shape
@@ -98,6 +101,8 @@ class Instance:
     emission: Rgb | None = None
     one_sided: bool = False
     emission_twosided: bool = False
+    interior: Medium | None = None
+    exterior: Medium | None = None
 
     def __post_init__(self) -> None:
         if self.to_world.shape != (4, 4) or not np.isfinite(self.to_world).all():

@@ -53,6 +53,7 @@ from scenes.daylight import sky_map, sun_light
 from scenes.formats.appearance.facets import with_even_facets
 from scenes.formats.appearance.folding import folded, mean_of
 from scenes.formats.appearance.indices import reflectance_of_index
+from scenes.formats.appearance.media import without_media
 from scenes.formats.appearance.simpler import simpler
 from scenes.formats.appearance.spectra import rgb
 from scenes.formats.appearance.spot_profiles import reshaped
@@ -80,6 +81,7 @@ class Approximation:
 
     def scene(self, scene: Scene) -> Scene:
         """The scene with all unsupported parts replaced."""
+        scene = without_media(scene, self.report)
         camera, depth = scene.camera, scene.integrator.depth
         if isinstance(camera, RealisticCamera):
             self.report.add("camera", "a camera with lenses", "a pinhole of 45 degrees")

@@ -12,7 +12,7 @@ from pathlib import Path
 
 import numpy as np
 
-from scenes.canonical import Material, SceneError
+from scenes.canonical import Material, Medium, SceneError
 from scenes.canonical.values import Matrix
 from scenes.formats.directives.names import Names
 from scenes.formats.directives.syntax import Directive, Parameters, Values, parameters_of, parse_directives
@@ -42,6 +42,8 @@ class Attributes:
     emission_twosided: bool = False
     power: float = 0.0  # power to which the emission is scaled, lumens; 0 for none
     reversed: bool = False
+    interior: Medium | None = None  # media of both sides; an empty one is vacuum that is given
+    exterior: Medium | None = None
     # parameters for the following directives, by target and name
     assumed: Mapping[tuple[str, str], tuple[Values, Values]] = field(default_factory=dict)
 

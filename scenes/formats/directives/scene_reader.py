@@ -25,6 +25,7 @@ from scenes.canonical import (
     Light,
     Masked,
     Matte,
+    Medium,
     Mesh,
     OrthographicCamera,
     PerspectiveCamera,
@@ -37,6 +38,7 @@ from scenes.canonical import (
 )
 from scenes.canonical.values import Matrix
 from scenes.formats.appearance.graphs import check_depth
+from scenes.formats.appearance.media import filled
 from scenes.formats.appearance.mixtures import is_nothing
 from scenes.formats.appearance.spectra import grey, rgb
 from scenes.formats.directives.reader import DirectiveReader, typed, word
@@ -71,6 +73,7 @@ class SceneReader(DirectiveReader):
     instances: list[Instance] = field(default_factory=list)
     lights: list[Light] = field(default_factory=list)
     objects: dict[str, list[Instance]] = field(default_factory=dict)
+    medium: Medium | None = None
     _object: list[Instance] | None = None
 
     def __post_init__(self) -> None:
@@ -91,15 +94,10 @@ class SceneReader(DirectiveReader):
             "MakeNamedMaterial": self._name_material, "NamedMaterial": self._take_material,
             "Shape": self.read_shape,
             "ObjectBegin": self._begin_object, "ObjectEnd": self._end_object, "ObjectInstance": self.place_object,
-            "MakeNamedMedium": self.lose_medium, "MediumInterface": self.lose_medium,
         }  # fmt: skip
 
     def _begin_world(self, directive: Directive) -> None:
         self.transforms.replace(np.eye(4))
-
-    def lose_medium(self, directive: Directive) -> None:
-        named = f" {word(directive)!r}" if directive.values and isinstance(directive.values[0], tuple) else ""
-        self.report.add(str(directive.place), f"{directive.name}{named} (participating medium)")
 
     def read_texture(self, directive: Directive) -> None:
         name, kind, wanted = word(directive), word(directive, 2), word(directive, 1)
@@ -130,6 +128,7 @@ class SceneReader(DirectiveReader):
 
     def _read_camera(self, directive: Directive) -> None:
         kind, parameters = typed(directive)
+        self.medium = None if self.attributes.exterior is None else filled(self.attributes.exterior)
         keys = [inverse(matrix) for matrix in self.transforms.current]
         self.transforms.named["camera"] = keys
         track = self._motion(keys, str(directive.place))
@@ -226,6 +225,10 @@ class SceneReader(DirectiveReader):
     def _motion(self, keys: Sequence[Matrix], where: str) -> RigidTrack | None:
         return motion(keys, self.transforms.times_s, where, self.report)
 
+    def sides(self) -> tuple[Medium | None, Medium | None]:
+        """The media inside and outside of the following shapes."""
+        return self.attributes.interior, self.attributes.exterior
+
     def read_shape(self, directive: Directive) -> None:
         kind, parameters = typed(directive)
         made = self.shapes.made(kind, parameters, self.attributes.reversed, self.beside)
@@ -240,7 +243,8 @@ class SceneReader(DirectiveReader):
         if "shadowalpha" in parameters:
             parameters.asked.add("shadowalpha")
             self.report.add(str(directive.place), "shadowalpha of a shape", "its alpha")
-        if is_nothing(material) and self.attributes.emission is None:
+        interior, exterior = self.sides()
+        if is_nothing(material) and self.attributes.emission is None and interior is None and exterior is None:
             self.report.hint(str(directive.place), "the border of a medium, which is invisible")
             self.left_over(parameters, f"shape {kind!r}")
             return
@@ -255,6 +259,8 @@ class SceneReader(DirectiveReader):
                 track,
                 emission=self.attributes.emission,
                 emission_twosided=self.attributes.emission is not None and self.attributes.emission_twosided,
+                interior=interior,
+                exterior=exterior,
             ),
             directive,
         )
@@ -281,6 +287,7 @@ def scene_of(reader: SceneReader, path: Path) -> Scene:
         reader.film,
         reader.sampler,
         reader.integrator,
+        medium=reader.medium,
         materials=dict(reader.names.materials),
         name=Path(path).stem,
         duration_s=duration_s(camera, reader.instances),

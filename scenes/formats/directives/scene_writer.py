@@ -12,15 +12,17 @@ from scenes.canonical import (
     EnvironmentCamera,
     Instance,
     Light,
+    Medium,
     Mesh,
     OrthographicCamera,
     PerspectiveCamera,
     RealisticCamera,
     Scene,
 )
+from scenes.formats.appearance.media import media_of
 from scenes.formats.directives.surface_writer import SurfaceWriter
 from scenes.formats.geometry.conventions import FAR, aspect_of
-from scenes.formats.geometry.placing import PartKey, lose_back, part_key, shared_parts
+from scenes.formats.geometry.placing import PartKey, borders_media, lose_back, part_key, shared_parts
 from scenes.formats.text.numbers import listed, number
 
 INLINE_MAX = 64
@@ -31,10 +33,19 @@ _ENDLESS = 1000  # bounces that replace an unlimited depth
 
 @dataclass
 class SceneWriter(SurfaceWriter):
-    """Collects the lines of a scene; a dialect adds settings, lights and shapes."""
+    """Collects the lines of a scene; a dialect adds settings, lights and shapes.
+
+    Attributes:
+        aspect: width and height of the picture in shorter sides.
+        shared: parts that are written once as objects.
+        media: names of the media.
+        medium: medium around the camera.
+    """
 
     aspect: tuple[float, float] = (1.0, 1.0)
     shared: frozenset[PartKey] = frozenset()
+    media: dict[Medium, str] = field(default_factory=dict)
+    medium: Medium | None = None
     _objects: dict[PartKey, str] = field(default_factory=dict)
 
     def write(self, scene: Scene) -> None:
@@ -42,6 +53,7 @@ class SceneWriter(SurfaceWriter):
         self.shared = shared_parts(scene)
         self.aspect = aspect_of(scene.film)
         self.write_settings(scene)
+        self._write_media(scene)
         self.write_camera(scene.camera)
         self.lines.append("WorldBegin")
         self._environment_only_seen(scene)
@@ -53,6 +65,23 @@ class SceneWriter(SurfaceWriter):
             lose_back(instance, self.report)
             self.write_instance(instance)
         self.lines.append("WorldEnd")
+
+    def _write_media(self, scene: Scene) -> None:
+        """Writes the media, and which of them is around the camera."""
+        self.medium = scene.medium
+        for medium in media_of(scene):
+            self.media[medium] = self.label("medium")
+            self.lines.append(self.medium_line(medium, self.media[medium]))
+        if self.media:
+            self.lines += self.around_camera()
+
+    def medium_line(self, medium: Medium, name: str) -> str:
+        """The definition of a medium."""
+        raise NotImplementedError
+
+    def around_camera(self) -> list[str]:
+        """Lines that set the medium around the camera."""
+        raise NotImplementedError
 
     def write_settings(self, scene: Scene) -> None:
         """Writes the integrator, the sampler, the filter and the film."""
@@ -131,7 +160,10 @@ class SceneWriter(SurfaceWriter):
             made = self.part(instance)
             label = self.label("o")
             self._objects[key] = label
-            self.lines += [f'\tObjectBegin "{label}"', *(f"\t\t{line}" for line in made), "\tObjectEnd"]
+            lines = [f'\tObjectBegin "{label}"', *(f"\t\t{line}" for line in made), "\tObjectEnd"]
+            if borders_media(instance):  # LuxCore's media go on behind the object
+                lines = ["\tAttributeBegin", *lines, "\tAttributeEnd"]
+            self.lines += lines
         return f'ObjectInstance "{self._objects[key]}"'
 
     def mesh_line(self, mesh: Mesh, in_file: bool = False) -> str:

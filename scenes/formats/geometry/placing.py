@@ -10,18 +10,19 @@ from scipy.spatial.transform import Rotation
 
 from scenes.animation import look_at, pose_at
 from scenes.arithmetic import product
-from scenes.canonical import Emissive, Instance, Mesh, Scene
+from scenes.canonical import Emissive, Instance, Medium, Mesh, Scene
 from scenes.canonical.values import Matrix, Rgb, RigidTrack
 from scenes.formats.geometry.orientation import is_closed
 from scenes.formats.geometry.transform_stack import track_times
 from scenes.formats.losses import LossReport
 
-PartKey = tuple[int, int, bool]
+PartKey = tuple[int, int, bool, Medium | None, Medium | None]
 
 
 def part_key(instance: Instance) -> PartKey:
-    """A key that is equal for instances of the same shape and material with equal sidedness."""
-    return id(instance.shape), id(instance.material), instance.one_sided
+    """A key that is equal for instances of the same shape and material with equal sidedness and media."""
+    parts = id(instance.shape), id(instance.material)
+    return *parts, instance.one_sided, instance.interior, instance.exterior
 
 
 def shared_parts(scene: Scene) -> frozenset[PartKey]:
@@ -67,6 +68,16 @@ def lose_shine_behind(instance: Instance, report: LossReport) -> None:
     """Reports light of the back."""
     if shines_behind(instance):
         report.add(instance.name or "shape", "a surface that shines on both sides", "on its front")
+
+
+def borders_media(instance: Instance) -> bool:
+    """Whether a shape is the border of a medium."""
+    return instance.interior is not None or instance.exterior is not None
+
+
+def has_outside(instance: Instance) -> bool:
+    """Whether a shape looks different if it is turned inside out: a lamp, or the border of a medium."""
+    return shines(instance) or borders_media(instance)
 
 
 def radiance_of(instance: Instance) -> Rgb | None:

@@ -36,6 +36,7 @@ from scenes.canonical import (
 )
 from scenes.canonical.values import Matrix, Rgb, RigidTrack
 from scenes.daylight import sun_light
+from scenes.formats.appearance.media import without_media
 from scenes.formats.appearance.spot_profiles import reshaped
 from scenes.formats.geometry.conventions import FAR
 from scenes.formats.geometry.meshed import about_middle, as_mesh, depends_on_uv, rectangle_mesh
@@ -67,6 +68,7 @@ class GltfWriter:
 
     def write(self, scene: Scene) -> None:
         """Writes a scene."""
+        scene = without_media(scene, self.report)
         self._camera(scene.camera, scene.film)
         for number, instance in enumerate(scene.instances):
             self._instance(instance, instance.name.rpartition("/")[2] or f"{type(instance.shape).__name__}{number}")

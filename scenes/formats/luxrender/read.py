@@ -33,12 +33,14 @@ from scenes.formats.appearance.folding import mean_of
 from scenes.formats.appearance.spectra import grey, rgb
 from scenes.formats.directives import lights
 from scenes.formats.directives.reader import typed, word
-from scenes.formats.directives.scene_reader import SceneReader, scene_of
+from scenes.formats.directives.scene_reader import scene_of
 from scenes.formats.directives.syntax import Directive, Parameters, parameters_of
 from scenes.formats.geometry.meshed import as_mesh, turned_over
+from scenes.formats.geometry.placing import has_outside
 from scenes.formats.geometry.revolution import area
 from scenes.formats.geometry.transform_stack import KEYS_MAX
 from scenes.formats.losses import SAME_PICTURE, LossReport
+from scenes.formats.luxrender.media import LuxMediaReader
 from scenes.formats.luxrender.read_materials import LuxSurfaces, lux_image
 from scenes.formats.text.scene_files import SceneFiles
 
@@ -47,8 +49,7 @@ _INTEGRATORS = {"path": "path", "bidirectional": "bidirectional", "directlightin
                 "emission": "path", "multi": "path", "none": "path"}  # fmt: skip
 _SAMPLERS = {"lowdiscrepancy": "sobol", "random": "independent", "metropolis": "independent", "erpt": "independent",
              "sobol": "sobol", "halton": "halton"}  # fmt: skip
-_NO_EFFECT = ("Renderer", "Accelerator", "VolumeIntegrator", "RenderingServer")
-_MEDIA = ("MakeNamedVolume", "Exterior", "Interior", "Volume")
+_NO_EFFECT = ("Renderer", "Accelerator", "RenderingServer")
 SPHERE_SR = 4.0 * math.pi
 """Ratio of ``L`` of LuxCore's point light to its intensity (measured: 10 gives 0.0314 from a floor of albedo 0.5 two
 units below)."""
@@ -71,7 +72,7 @@ def cone_sr(angle_deg: float) -> float:
 
 
 @dataclass
-class LuxReader(SceneReader):
+class LuxReader(LuxMediaReader):
     """State of reading a LuxRender file."""
 
     left_handed: bool = False
@@ -85,7 +86,6 @@ class LuxReader(SceneReader):
         return {
             **super().dialect(),
             **dict.fromkeys(_NO_EFFECT, lambda d: None),
-            **dict.fromkeys(_MEDIA, self.lose_medium),
             **dict.fromkeys(("Integrator", "SurfaceIntegrator"), self._read_integrator),
             "Film": self._read_film,
             "Sampler": self._read_sampler,
@@ -272,8 +272,8 @@ class LuxReader(SceneReader):
         self.left_over(parameters, "area light")
 
     def _keep(self, instance: Instance, directive: Directive) -> None:
-        """Keeps a shape; a lamp emits towards the side from which its placed faces are counter-clockwise."""
-        if instance.emission is not None and determinant(instance.to_world) < 0.0:
+        """Keeps a shape; lamps and media have their outside where its placed faces are counter-clockwise."""
+        if has_outside(instance) and determinant(instance.to_world) < 0.0:
             instance = turned_over(instance)
         super()._keep(instance, directive)
 

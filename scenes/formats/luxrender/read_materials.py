@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from scenes import loading
-from scenes.arithmetic import power
+from scenes.arithmetic import log, power
 from scenes.canonical import (
     ConstantTexture,
     Glass,
@@ -30,15 +30,27 @@ from scenes.formats.appearance.folding import mean_of, product_of
 from scenes.formats.appearance.indices import index_of_reflectance
 from scenes.formats.appearance.mixtures import NOTHING, is_nothing, mixture_of
 from scenes.formats.appearance.spectra import blackbody_rgb, grey, metal, rgb
-from scenes.formats.directives.names import Of
+from scenes.formats.directives.names import Names, Of
 from scenes.formats.directives.surfaces import Maker, SurfaceFactory
 from scenes.formats.directives.syntax import Parameters
 from scenes.formats.directives.textures import Pair
 from scenes.formats.geometry.conventions import first_row_below
+from scenes.formats.losses import LossReport
+from scenes.formats.text.scene_files import SceneFiles
+
+_DARKEST = 1e-9  # share of light beyond a colordepth texture, as in LuxCore
 
 
 class LuxSurfaces(SurfaceFactory):
-    """Reader of textures and materials of LuxRender."""
+    """Reader of textures and materials of LuxRender.
+
+    Attributes:
+        of_volumes: glasses whose refractive index is that of the volumes on both sides, by their ``id``.
+    """
+
+    def __init__(self, files: SceneFiles, report: LossReport, names: Names) -> None:
+        super().__init__(files, report, names)
+        self.of_volumes: dict[int, Material] = {}
 
     def image(self, parameters: Parameters, scale: Pair, offset: Pair) -> Texture:
         where = str(parameters.place)
@@ -59,6 +71,12 @@ class LuxSurfaces(SurfaceFactory):
             return ConstantTexture(blackbody_rgb(min(max(parameters.number("temperature", 6500.0), 100.0), 1e6), 1.0))
         if kind == "equalenergy":
             return ConstantTexture(grey(parameters.number("energy", 1.0)))
+        if kind == "colordepth":
+            share = np.clip(self.color(parameters, "Kt", grey(0.0)), _DARKEST, 1.0)
+            depth = parameters.number("depth", 1.0)
+            if not depth > 0.0:
+                raise SceneError(f"{parameters.place}: depth: expected a positive number, got {depth:g}")
+            return ConstantTexture(rgb(np.maximum(-log(share), 0.0) / depth))
         return super().made_texture(kind, parameters, of)
 
     def make_fresnel(self, kind: str, parameters: Parameters) -> tuple[Rgb, Rgb]:
@@ -85,7 +103,7 @@ class LuxSurfaces(SurfaceFactory):
 
     def makers(self) -> dict[str, Maker]:
         return {
-            "matte": self.matte, "mirror": self._mirror, "glass": self._glass, "glass2": self._glass,
+            "matte": self.matte, "mirror": self._mirror, "glass": self._glass, "glass2": self._glass_of_volumes,
             "roughglass": self._glass, "metal": self._named_metal, "metal2": self._metal, "glossy": self._glossy,
             "shinymetal": self._glossy, "mix": self._mix, "mattetranslucent": self._mattetranslucent,
             "null": lambda _: NOTHING,
@@ -111,6 +129,11 @@ class LuxSurfaces(SurfaceFactory):
         if thin:
             self.report.add(str(parameters.place), "architectural glass", "a pane, which reflects as much at its back")
         return Glass(*parts, self.scalar(parameters, "index", 1.5), facets.roughness, thin, alpha=facets.alpha)
+
+    def _glass_of_volumes(self, parameters: Parameters) -> Material:
+        made = self._glass(parameters)
+        self.of_volumes[id(made)] = made
+        return made
 
     def _named_metal(self, parameters: Parameters) -> Material:
         name = parameters.text("name", "aluminium")

@@ -18,6 +18,7 @@ from scenes.canonical import (
     EnvironmentLight,
     Instance,
     Light,
+    Medium,
     Mesh,
     OrthographicCamera,
     PerspectiveCamera,
@@ -30,14 +31,23 @@ from scenes.canonical import (
 )
 from scenes.canonical.values import Matrix, Rgb
 from scenes.daylight import sky_map
-from scenes.formats.appearance.mixtures import direct_if_same
+from scenes.formats.appearance.media import media_of
+from scenes.formats.appearance.mixtures import direct_if_same, is_nothing
 from scenes.formats.appearance.spot_profiles import reshaped
 from scenes.formats.directives.scene_reader import FILTERS
 from scenes.formats.directives.scene_writer import SceneWriter, quoted
 from scenes.formats.geometry.conventions import FAR, MAP_AXES
 from scenes.formats.geometry.meshed import as_mesh
 from scenes.formats.geometry.orientation import upright
-from scenes.formats.geometry.placing import lose_shine_behind, motion_keys, part_key, radiance_of, shines
+from scenes.formats.geometry.placing import (
+    borders_media,
+    has_outside,
+    lose_shine_behind,
+    motion_keys,
+    part_key,
+    radiance_of,
+    shines,
+)
 from scenes.formats.geometry.revolution import lamp_sphere
 from scenes.formats.geometry.transform_stack import inverse
 from scenes.formats.losses import LossReport, first_of
@@ -56,6 +66,8 @@ _INTEGRATORS = {"path": "path", "whitted": "directlighting", "direct": "directli
 class LuxWriter(LuxSurfaceWriter, SceneWriter):
     """Collects the lines of a LuxRender scene."""
 
+    _vacuum: str = ""
+
     def write_settings(self, scene: Scene) -> None:
         scene = direct_if_same(scene)
         integrator, sampler, film, depth = scene.integrator, scene.sampler, scene.film, self.depth(scene)
@@ -68,6 +80,8 @@ class LuxWriter(LuxSurfaceWriter, SceneWriter):
             limit = f'"integer maxdepth" [ {edges} ]'
         self.lines.append('Renderer "sampler"')
         self.lines.append(f'SurfaceIntegrator "{kind}" {limit}')
+        if any(medium.scatters for medium in media_of(scene)):
+            self.lines.append('VolumeIntegrator "multi"')
         if sampler.kind in ("halton", "hammersley", "stratified"):
             self.report.hint("sampler", sampler.kind, "lowdiscrepancy")
         count = sampler.samples_per_pixel
@@ -171,7 +185,7 @@ class LuxWriter(LuxSurfaceWriter, SceneWriter):
         """Writes a shape with its placement. LuxCore supports objects only for mesh files, and shows the last key of a
         motion."""
         mirrored = determinant(instance.to_world) < 0.0
-        if mirrored and (isinstance(instance.shape, Sphere) or shines(instance)):
+        if mirrored and (isinstance(instance.shape, Sphere) or has_outside(instance)):
             mesh, matrix = upright(self._meshed(instance), instance.to_world)
             instance = dataclasses.replace(instance, shape=mesh, to_world=matrix)
         made = [self.object_line(instance)] if part_key(instance) in self.shared else self.part(instance)
@@ -183,11 +197,30 @@ class LuxWriter(LuxSurfaceWriter, SceneWriter):
     def part(self, instance: Instance) -> list[str]:
         emission = radiance_of(instance)
         lose_shine_behind(instance, self.report)
-        lines = [f'NamedMaterial "{self.material(instance.material)}"']
+        invisible = is_nothing(instance.material) and emission is None
+        lines = [f'NamedMaterial "{self.material(self.nothing() if invisible else instance.material)}"']
+        if borders_media(instance):
+            lines += [f'Interior "{self._volume(instance.interior)}"', f'Exterior "{self._volume(instance.exterior)}"']
         if emission is not None:
             off = '"float gain" [ 1 ] "float power" [ 0 ] "float efficacy" [ 0 ]'
             lines.append(f'AreaLightSource "area" "color L" {listed(emission)} {off}')
         return [*lines, self._shape(instance)]
+
+    def medium_line(self, medium: Medium, name: str) -> str:
+        """The definition of a medium; LuxCore 2.10 reads volumes of the kind ``clear`` alone from these files."""
+        if not medium.scatters:
+            return f'MakeNamedVolume "{name}" "clear" "color absorption" {listed(medium.absorption)}'
+        parts = f'"color sigma_a" {listed(medium.absorption)} "color sigma_s" {listed(medium.scattering)}'
+        return f'MakeNamedVolume "{name}" "homogeneous" {parts} "color g" {listed((medium.g,) * 3)}'
+
+    def around_camera(self) -> list[str]:
+        """LuxCore has no unnamed vacuum, and takes an exterior outside of blocks for the medium around the camera."""
+        self._vacuum = self.label("vacuum", "vacuum")
+        lines = [f'MakeNamedVolume "{self._vacuum}" "clear" "color absorption" [ 0 0 0 ]']
+        return [*lines, f'Exterior "{self.media[self.medium]}"'] if self.medium is not None else lines
+
+    def _volume(self, medium: Medium | None) -> str:
+        return self._vacuum if medium is None else self.media[medium]
 
     def _meshed(self, instance: Instance) -> Mesh:
         """A shape as triangles, because LuxCore ignores spheres and disks."""

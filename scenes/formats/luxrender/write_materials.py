@@ -61,7 +61,7 @@ class LuxSurfaceWriter(SurfaceWriter):
         if isinstance(material, Uber):
             material = lobes_of(material, where, self.report, schlick=True)
         if isinstance(material, Masked):
-            material = MixMaterial(self._nothing(), material.base, material.opacity)
+            material = MixMaterial(self.nothing(), material.base, material.opacity)
         elif isinstance(material, Plastic) and not material.layered:
             material = added_coat(material)
         elif isinstance(material, Metal) and _even(material.reflectance_scale):
@@ -81,7 +81,7 @@ class LuxSurfaceWriter(SurfaceWriter):
         if any(map(lets_through, parts)) and not is_binary(material.amount) and not all(map(_is_sharp, parts)):
             self.report.add(where, "light on a part of a mixture with holes or panes", "darker by its share in LuxCore")
 
-    def _nothing(self) -> Material:
+    def nothing(self) -> Material:
         """An invisible surface."""
         if self._null is None:
             self._null = Matte(ConstantTexture((0.0, 0.0, 0.0)))

@@ -15,6 +15,7 @@ from scenes.canonical import (
 )
 from scenes.formats.geometry.conventions import duration_s
 from scenes.formats.losses import LossReport
+from scenes.formats.mitsuba.media import MitsubaMedia
 from scenes.formats.mitsuba.modern import in_old_words, is_modern
 from scenes.formats.mitsuba.read_lights import MitsubaLights
 from scenes.formats.mitsuba.read_materials import MitsubaSurfaces
@@ -27,6 +28,10 @@ from scenes.formats.text.xml_tree import XmlNode, parse_xml
 TEXT_MAX = 1 << 16
 """Maximum number of characters of a value with its parameters."""
 
+
+_OF_MEDIA = ("volpath",)
+_OF_MEDIA_0 = (*_OF_MEDIA, "volpath_simple", "bdpt", "mlt", "pssmlt", "erpt", "ptracer", "photonmapper")
+"""Integrators that draw media, of Mitsuba 3 and of 0.5."""
 
 _NAME_MAX = 256
 """Maximum number of characters of a parameter's name."""
@@ -43,7 +48,8 @@ class MitsubaReader(MitsubaSettings):
         self._longest = 0
         self._missing: dict[str, XmlNode] = {}
         self.surfaces = MitsubaSurfaces(files, report, self.find)
-        self.shapes = MitsubaShapes(files, report, self.surfaces, self.find)
+        self.media = MitsubaMedia(report, self.find)
+        self.shapes = MitsubaShapes(files, report, self.surfaces, self.media, self.find)
         self.materials: dict[str, Material] = {}
         self.instances: list[Instance] = []
         self.lights = MitsubaLights(files, report)
@@ -72,7 +78,7 @@ class MitsubaReader(MitsubaSettings):
     def _within(self, root: XmlNode, path: Path, inside: list[Path]) -> list[XmlNode]:
         if root.tag != "scene":
             raise SceneError(f"{root.place}: expected a scene, got {root.tag!r}")
-        modern = self.shapes.modern = is_modern(root.get("version"), root)
+        modern = self.shapes.modern = self.media.modern = is_modern(root.get("version"), root)
         found = []
         for node in root.children:
             if node.tag == "default":
@@ -163,7 +169,11 @@ class MitsubaReader(MitsubaSettings):
             self.instances += self.shapes.read(node)
         elif node.tag == "emitter":
             self.lights.read(node)
-        elif node.tag in ("medium", "phase", "volume", "subsurface"):
+        elif node.tag == "medium":
+            self.media.read(node)
+        elif node.tag in ("phase", "volume"):
+            return  # parts of media that have their names
+        elif node.tag == "subsurface":
             named = f" {node.get('id')!r}" if node.get("id") else ""
             self.report.add(str(node.place), f"{node.tag}{named} (participating medium)")
         else:
@@ -191,5 +201,8 @@ def scene_of(reader: MitsubaReader, path: Path) -> Scene:
         report.add(str(path), "no sensor", "one that sees the shapes along z")
         reader.camera = seeing_all(reader.instances)
     parts = tuple(reader.instances), tuple(reader.lights.lights), reader.film, reader.sampler, reader.integrator
+    if reader.media.any and reader.drawn_by not in (_OF_MEDIA if reader.media.modern else _OF_MEDIA_0):
+        report.add(str(path), f"integrator {reader.drawn_by!r}, which draws no media", "one that draws them")
     lasts = duration_s(reader.camera, reader.instances)
-    return Scene(reader.camera, *parts, materials=dict(reader.materials), name=Path(path).stem, duration_s=lasts)
+    return Scene(reader.camera, *parts, medium=reader.medium, materials=dict(reader.materials), name=Path(path).stem,
+                 duration_s=lasts)  # fmt: skip

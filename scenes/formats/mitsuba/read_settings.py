@@ -16,6 +16,7 @@ from scenes.canonical import (
     EnvironmentCamera,
     Film,
     Integrator,
+    Medium,
     OrthographicCamera,
     PerspectiveCamera,
     Sampler,
@@ -24,6 +25,7 @@ from scenes.canonical import (
 from scenes.formats.geometry.conventions import FAR
 from scenes.formats.geometry.transform_stack import motion
 from scenes.formats.losses import SAME_PICTURE, LossReport
+from scenes.formats.mitsuba.media import MitsubaMedia
 from scenes.formats.mitsuba.properties import Properties
 from scenes.formats.text.xml_tree import XmlNode
 
@@ -48,7 +50,10 @@ class MitsubaSettings:
 
     def __init__(self, report: LossReport) -> None:
         self.report = report
+        self.media: MitsubaMedia
         self.camera: Camera | None = None
+        self.medium: Medium | None = None
+        self.drawn_by = "path"
         self.film, self.sampler, self.integrator = Film(768, 576), Sampler("independent", 4), Integrator("path", -1)
 
     def setting(self, node: XmlNode) -> None:
@@ -58,6 +63,7 @@ class MitsubaSettings:
 
     def _integrator(self, node: XmlNode) -> None:
         kind, properties = node.get("type"), Properties(node, self.report)
+        self.drawn_by = kind
         if kind == "volpath":  # the same in scenes without holes, and written for those with such
             kind = "path"
         name = self.report.kind(INTEGRATORS, kind, "integrator", node.place, kind not in SAME_PICTURE)
@@ -96,13 +102,16 @@ class MitsubaSettings:
 
     def _sensor(self, node: XmlNode) -> None:
         kind, properties = node.get("type"), Properties(node, self.report)
+        self.medium = None
         for child in properties.rest:
-            if child.tag in ("film", "sampler"):
-                self.setting(child)
-            elif child.tag == "medium":
-                self.report.add(str(child.place), "a medium around the sensor (participating medium)")
+            node = self.media.find(child) if child.tag == "ref" else child
+            if node.tag in ("film", "sampler"):
+                self.setting(node)
+            elif node.tag == "medium":
+                properties.asked.add(child.get("name"))
+                self.medium = self.media.read(node)
             else:
-                self.report.unknown(child.place, f"{child.tag} inside a sensor", child.get("type"))
+                self.report.unknown(node.place, f"{node.tag} inside a sensor", node.get("type"))
         keys, times_s = properties.motion()
         to_world, track = product(keys[0], FORWARD), motion(keys, times_s, properties.where, self.report)
         for plane in ("nearClip", "farClip"):

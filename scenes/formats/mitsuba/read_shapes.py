@@ -12,7 +12,7 @@ from pathlib import Path
 
 import numpy as np
 
-from scenes.arithmetic import norm, product, tan
+from scenes.arithmetic import determinant, norm, product, tan
 from scenes.canonical import (
     ConstantTexture,
     Cube,
@@ -20,6 +20,7 @@ from scenes.canonical import (
     Instance,
     Material,
     Matte,
+    Medium,
     Mesh,
     PerspectiveCamera,
     Rectangle,
@@ -40,6 +41,7 @@ from scenes.formats.geometry.ply_files import read_ply
 from scenes.formats.geometry.recognition import shape_of
 from scenes.formats.geometry.transform_stack import motion, moved_by, translation
 from scenes.formats.losses import LossReport
+from scenes.formats.mitsuba.media import MitsubaMedia
 from scenes.formats.mitsuba.properties import Properties
 from scenes.formats.mitsuba.read_materials import MitsubaSurfaces
 from scenes.formats.text.scene_files import SceneFiles
@@ -48,6 +50,7 @@ from scenes.formats.text.xml_tree import XmlNode
 _SHAPES = ("sphere", "rectangle", "cube", "disk", "cylinder", "obj", "ply", "serialized")
 _HAIR = ("hair", "bsplinecurve", "linearcurve")
 _LEFT_OUT = (*_HAIR, "heightfield", "deformable", "sdfgrid", "ellipsoids", "ellipsoidsmesh")
+_FLAT = ("rectangle", "disk")
 _DEFAULT = Matte(ConstantTexture(grey(0.5)))
 
 
@@ -55,9 +58,14 @@ class MitsubaShapes:
     """Creates instances from elements; each mesh file is read once."""
 
     def __init__(
-        self, files: SceneFiles, report: LossReport, surfaces: MitsubaSurfaces, find: Callable[[XmlNode], XmlNode]
+        self,
+        files: SceneFiles,
+        report: LossReport,
+        surfaces: MitsubaSurfaces,
+        media: MitsubaMedia,
+        find: Callable[[XmlNode], XmlNode],
     ) -> None:
-        self.files, self.report, self.surfaces, self.find = files, report, surfaces, find
+        self.files, self.report, self.surfaces, self.media, self.find = files, report, surfaces, media, find
         self.groups: dict[int, list[Instance]] = {}
         self.modern = False
         self._meshes: dict[tuple, Mesh] = {}
@@ -91,9 +99,10 @@ class MitsubaShapes:
         track = motion(keys, times_s, properties.where, self.report)
         used = self._materials_of(properties) if kind == "obj" else []
         surfaces, emission = self._inside(properties, used)
+        sides = self._sides(properties)
         found = []
         for name, (material, one_sided) in surfaces.items():
-            if is_nothing(material) and emission is None:
+            if is_nothing(material) and emission is None and sides == (None, None):
                 self.report.hint(properties.where, "the border of a medium, which is invisible")
                 continue
             faces = {name} if name is not None else set(used) - set(surfaces)
@@ -104,7 +113,11 @@ class MitsubaShapes:
             if properties.truth("flipNormals", False):
                 shape = turned(as_mesh(shape))
             place = product(keys[0], local)
-            found.append(Instance(shape, material, place, track, node.get("id"), emission, one_sided))
+            inside, outside = sides
+            if self.modern and kind not in _FLAT and determinant(place) < 0.0:
+                inside, outside = outside, inside  # as measured with Mitsuba 3.9
+            made = Instance(shape, material, place, track, node.get("id"), emission, one_sided)
+            found.append(dataclasses.replace(made, interior=inside, exterior=outside))
         if found:
             properties.left_over()
         return found
@@ -150,7 +163,8 @@ class MitsubaShapes:
     ) -> tuple[dict[str | None, tuple[Material, bool]], Rgb | None]:
         """Materials of a shape, each with whether its back is black, and its emission.
 
-        The key None has the material of all faces without a named one; a shape with only a medium is invisible.
+        The key None has the material of all faces without a named one; a shape of Mitsuba 0.5 with only a medium is
+        invisible, one of Mitsuba 3 grey.
         """
         named: dict[str | None, tuple[Material, bool]] = {}
         material, emission, one_sided, default = None, None, True, _DEFAULT
@@ -178,14 +192,26 @@ class MitsubaShapes:
                     self.report.hint(inner.where, "samplingWeight of a light", "the renderer's own choice")
                     inner.asked.add("samplingWeight")
                 inner.left_over()
-            elif node.tag in ("medium", "subsurface"):
-                default = NOTHING if node.tag == "medium" else default
+            elif node.tag == "medium":
+                default = default if self.modern else NOTHING
+            elif node.tag == "subsurface":
                 self.report.add(str(node.place), f"{node.tag} (participating medium)")
             elif node.tag not in ("texture",):
                 raise SceneError(f"{node.place}: expected a part of a shape, got {node.tag!r}")
         if len(named) < len(used) or not named:
             named[None] = material or default, one_sided
         return named, emission
+
+    def _sides(self, properties: Properties) -> tuple[Medium | None, Medium | None]:
+        """The media inside and outside of a shape."""
+        found: dict[str, Medium | None] = {}
+        for child in properties.rest:
+            node = self.find(child) if child.tag == "ref" else child
+            if node.tag == "medium":
+                if child.get("name") not in ("interior", "exterior"):
+                    self.report.unknown(child.place, "medium of a shape", child.get("name"))
+                found[child.get("name")] = self.media.read(node)
+        return found.get("interior"), found.get("exterior")
 
     def _made(
         self, kind: str, properties: Properties, material: Material, faces: set[str] | None

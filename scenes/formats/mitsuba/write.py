@@ -32,6 +32,8 @@ from scenes.formats.geometry.meshed import as_mesh, depends_on_uv
 from scenes.formats.geometry.orientation import FLIPPED, scales_evenly, upright
 from scenes.formats.geometry.placing import (
     PartKey,
+    borders_media,
+    has_outside,
     lose_shine_behind,
     motion_keys,
     part_key,
@@ -42,7 +44,7 @@ from scenes.formats.geometry.placing import (
 from scenes.formats.losses import LossReport, first_of
 from scenes.formats.mitsuba.read_settings import FILTERS, FORWARD
 from scenes.formats.mitsuba.write_elements import Element
-from scenes.formats.mitsuba.write_lights import MitsubaLightWriter
+from scenes.formats.mitsuba.write_media import MitsubaMediumWriter
 from scenes.formats.text.numbers import number
 from scenes.formats.text.output import Output
 from scenes.formats.text.xml_tree import xml_text
@@ -57,7 +59,7 @@ _INTEGRATORS = {"path": "path", "direct": "direct", "whitted": "direct", "bidire
 
 
 @dataclass
-class MitsubaWriter(MitsubaLightWriter):
+class MitsubaWriter(MitsubaMediumWriter):
     """Collects the elements of a scene; ``modern`` selects Mitsuba 3."""
 
     shared: frozenset[PartKey] = frozenset()
@@ -69,6 +71,7 @@ class MitsubaWriter(MitsubaLightWriter):
     def write(self, scene: Scene) -> None:
         """Writes a scene."""
         self.root.set("version", "3.0.0" if self.modern else "0.5.0")
+        self.media(scene)
         self._integrator(scene)
         self._sensor(scene)
         one_sided = {id(one.material) for one in scene.instances if one.one_sided}
@@ -92,6 +95,9 @@ class MitsubaWriter(MitsubaLightWriter):
         if scene.integrator.kind == "whitted":
             kind = "path"  # follows mirrors and glass
             self.report.add("integrator", "whitted", "path")
+        if self._media and kind in ("path", "direct"):
+            depth = min(depth, 1) if kind == "direct" and depth >= 0 else depth
+            kind = "volpath"
         if kind == "path" and any(
             map(lets_through, {id(one.material): one.material for one in scene.instances}.values())
         ):
@@ -105,6 +111,7 @@ class MitsubaWriter(MitsubaLightWriter):
     def _sensor(self, scene: Scene) -> None:
         camera, film = scene.camera, scene.film
         made = self._camera(camera, film.width_px / min(film.width_px, film.height_px))
+        self.around(made, scene.medium)
         self.root.append(made)
         kind = _SAMPLERS[scene.sampler.kind]
         if self.modern and kind in ("sobol", "halton", "hammersley"):
@@ -173,7 +180,9 @@ class MitsubaWriter(MitsubaLightWriter):
         move."""
         keys, times_s = motion_keys(instance.track, instance.to_world)
         where, shared = instance.name or "shape", part_key(instance) in self.shared
-        if shines(instance) or not (shared or (len(keys) > 1 and not self.modern)):
+        mirrored = determinant(instance.to_world) < 0.0
+        alone = shines(instance) or (borders_media(instance) and mirrored)
+        if alone or not (shared or (len(keys) > 1 and not self.modern)):
             made, local = self._shape(instance)
             self.root.append(made)
             self._placing(made, keys if local is _UNMOVED else [product(key, local) for key in keys], times_s, where)
@@ -234,21 +243,25 @@ class MitsubaWriter(MitsubaLightWriter):
                 self.report.add(instance.name or "shape", what, became)
             shape = as_mesh(shape)
         label, local = self.material(material, "", instance.one_sided), _UNMOVED
+        mirrored = determinant(instance.to_world) < 0.0
         kinds: dict[type, str] = {Sphere: "sphere", Disk: "disk", Rectangle: "rectangle", Cube: "cube", Mesh: "ply"}
         made = self.plugin("shape", kinds[type(shape)])
         if isinstance(shape, Mesh):
-            if shines(instance) and determinant(instance.to_world) < 0.0:
-                # a lamp emits towards the side from which its placed faces are counter-clockwise
+            if has_outside(instance) and mirrored:
+                # lamps and media have their outside where the placed faces are counter-clockwise
                 shape, local = upright(shape, instance.to_world)[0], FLIPPED
             self.put(made, "string", "filename", self.output.mesh(shape))
             if shape.normals is None:
                 self.put(made, "boolean", "faceNormals", "true")
         elif isinstance(shape, Sphere):
             self.put(made, "float", "radius", number(shape.radius))
-            local = FLIPPED if determinant(instance.to_world) < 0.0 else local
+            local = FLIPPED if mirrored else local
+        elif isinstance(shape, Cube):
+            local = FLIPPED if has_outside(instance) and mirrored else local
         elif isinstance(shape, Disk):
             local = np.diag([shape.radius, shape.radius, 1.0, 1.0])
         ElementTree.SubElement(made, "ref", {"id": label})
+        self.borders(made, instance)
         emission = radiance_of(instance)
         lose_shine_behind(instance, self.report)
         if emission is not None:

@@ -38,7 +38,7 @@ from scenes.canonical import (
 from scenes.canonical.textures import WHITE
 from scenes.formats.appearance.facets import with_even_facets
 from scenes.formats.appearance.folding import height_of, mean_of
-from scenes.formats.appearance.mixtures import added_metal, lobes_of
+from scenes.formats.appearance.mixtures import added_metal, is_nothing, lobes_of
 from scenes.formats.appearance.normals import is_flat, map_of, scaled_normals
 from scenes.formats.appearance.simpler import simpler
 from scenes.formats.appearance.spectra import rgb
@@ -72,6 +72,8 @@ class MitsubaSurfaceWriter(ElementWriter):
 
     def bsdf(self, material: Material, where: str) -> Element:
         """The element of a material; opaque ones are two-sided unless an instance is one-sided."""
+        if is_nothing(material):
+            return self.plugin("bsdf", "null")
         if isinstance(material, Masked):
             made = self.plugin("bsdf", "mask")
             self.texture(made, material.opacity, "opacity")

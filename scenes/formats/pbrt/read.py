@@ -15,10 +15,11 @@ from scenes import loading
 from scenes.canonical import EnvironmentLight, Integrator, Rgb, Sampler
 from scenes.formats.appearance.spectra import rgb
 from scenes.formats.directives import lights
-from scenes.formats.directives.reader import typed
+from scenes.formats.directives.reader import typed, word
 from scenes.formats.directives.scene_reader import SceneReader
 from scenes.formats.directives.syntax import Directive, Parameters
 from scenes.formats.losses import SAME_PICTURE
+from scenes.formats.pbrt.media import PbrtMedia
 from scenes.formats.pbrt.read_materials import PbrtSurfaces
 
 _DEPTH = 5
@@ -32,6 +33,7 @@ class PbrtReader(SceneReader):
         samplers, integrators: canonical names by the names of the dialect.
         same_picture: integrators that compute the same picture.
         sampler_hints, integrator_hints: parameters that are hints to the renderer.
+        of_media: integrators that draw media.
     """
 
     samplers: ClassVar[Mapping[str, str]] = {
@@ -45,6 +47,12 @@ class PbrtReader(SceneReader):
     same_picture: ClassVar[frozenset[str] | set[str]] = SAME_PICTURE
     sampler_hints: ClassVar[tuple[str, ...]] = ()
     integrator_hints: ClassVar[tuple[str, ...]] = ()
+    of_media: ClassVar[tuple[str, ...]] = ("volpath", "bdpt", "mlt")
+    _drawn_by: str = "path"
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        self.media = PbrtMedia(self.surfaces, self.report)
 
     def make_surfaces(self) -> PbrtSurfaces:
         return PbrtSurfaces(self.files, self.report, self.names)
@@ -54,8 +62,18 @@ class PbrtReader(SceneReader):
             **super().dialect(),
             "Film": self._read_film, "Sampler": self._read_sampler, "Integrator": self._read_integrator,
             "SurfaceIntegrator": self._read_integrator, "LightSource": self._read_light,
-            "AreaLightSource": self._read_area_light,
+            "AreaLightSource": self._read_area_light, "MakeNamedMedium": self._read_medium,
+            "MediumInterface": lambda d: self.media.interface(d, self.attributes),
         }  # fmt: skip
+
+    def _read_medium(self, directive: Directive) -> None:
+        self.left_over(self.media.make(directive), f"medium {word(directive)!r}")
+
+    def finish(self) -> None:
+        super().finish()
+        if self._drawn_by not in self.of_media and any(medium is not None for medium in self.media.named.values()):
+            what = f"integrator {self._drawn_by!r}, which draws no media"
+            self.report.add(str(self.files.main.name), what, "one that draws them")
 
     def _read_film(self, directive: Directive) -> None:
         kind, parameters = typed(directive)
@@ -75,6 +93,7 @@ class PbrtReader(SceneReader):
 
     def _read_integrator(self, directive: Directive) -> None:
         kind, parameters = typed(directive)
+        self._drawn_by = kind
         name = self.report.kind(self.integrators, kind, "integrator", directive.place, kind not in self.same_picture)
         self.integrator = Integrator(name, parameters.whole("maxdepth", _DEPTH, 0, 1 << 20))  # type: ignore[arg-type]
         self._hints(directive, parameters, self.integrator_hints, "integrator")

@@ -49,6 +49,7 @@ class PbrtV4Reader(PbrtReader):
     }  # fmt: skip
     same_picture: ClassVar = SAME_PICTURE | {"simplepath", "simplevolpath", "lightpath", "randomwalk"}
     sampler_hints: ClassVar = ("seed", "randomization", "jitter")
+    of_media: ClassVar = ("volpath", "simplevolpath", "bdpt", "mlt")
     integrator_hints: ClassVar = ("lightsampler", "regularize", "samplelights", "samplebsdf")
 
     film: Film = field(default_factory=lambda: Film(1280, 720, "gaussian", 1.5))
@@ -56,10 +57,11 @@ class PbrtV4Reader(PbrtReader):
     _imported: tuple[Path, ...] = ()
     _shutter: float = 1.0
     _iso: float = 100.0
+    _drawn_by: str = "volpath"
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        self.names.lasting = True
+        self.names.lasting, self.media.preset_first = True, True
         assert isinstance(self.surfaces, PbrtV4Surfaces)
         self._lights = V4Lights(self.surfaces, self.files, self.report)
 

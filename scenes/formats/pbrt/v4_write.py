@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
+from typing import ClassVar
 
 import numpy as np
 
@@ -35,6 +36,8 @@ _FILTERS = {"box": "box", "tent": "triangle", "gaussian": "gaussian", "mitchell"
 @dataclass
 class PbrtV4Writer(PbrtV4SurfaceWriter, PbrtWriter):
     """Collects the lines of a PBRT v4 scene."""
+
+    nothing: ClassVar[str] = "interface"
 
     def write(self, scene: Scene) -> None:
         super().write(scene)

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 
@@ -21,6 +22,7 @@ from scenes.canonical import (
     Instance,
     Light,
     Masked,
+    Medium,
     PointLight,
     RigidTrack,
     Scene,
@@ -30,12 +32,21 @@ from scenes.canonical import (
 )
 from scenes.canonical.values import Matrix
 from scenes.daylight import sky_map, sun_light
+from scenes.formats.appearance.media import media_of
+from scenes.formats.appearance.mixtures import is_nothing
 from scenes.formats.appearance.spot_profiles import reshaped
 from scenes.formats.directives.scene_reader import FILTERS, FORWARD
 from scenes.formats.directives.scene_writer import SceneWriter, quoted
 from scenes.formats.geometry.conventions import MAP_AXES
 from scenes.formats.geometry.meshed import as_mesh
-from scenes.formats.geometry.placing import motion_keys, part_key, radiance_of, shines_behind, tracks_of
+from scenes.formats.geometry.placing import (
+    borders_media,
+    motion_keys,
+    part_key,
+    radiance_of,
+    shines_behind,
+    tracks_of,
+)
 from scenes.formats.geometry.transform_stack import inverse, track_times
 from scenes.formats.losses import LossReport, first_of
 from scenes.formats.pbrt.read import PbrtReader
@@ -49,8 +60,14 @@ _SAMPLERS = {**first_of(PbrtReader.samplers), "hammersley": "halton"}
 
 @dataclass
 class PbrtWriter(PbrtSurfaceWriter, SceneWriter):
-    """Collects the lines of a PBRT scene."""
+    """Collects the lines of a PBRT scene.
 
+    Attributes:
+        nothing: kind of an invisible material.
+        times_s: the times of all motions, seconds.
+    """
+
+    nothing: ClassVar[str] = "none"
     times_s: tuple[float, float] = (0.0, 1.0)
 
     def write_times(self, scene: Scene) -> None:
@@ -66,7 +83,13 @@ class PbrtWriter(PbrtSurfaceWriter, SceneWriter):
     def write_settings(self, scene: Scene) -> None:
         self.write_times(scene)
         integrator, sampler, film, depth = scene.integrator, scene.sampler, scene.film, self.depth(scene)
-        self.lines.append(f'Integrator "{_INTEGRATORS[integrator.kind]}" "integer maxdepth" [ {depth} ]')
+        kind = _INTEGRATORS[integrator.kind]
+        if media_of(scene) and kind not in PbrtReader.of_media:
+            depth = min(depth, 1) if kind == "directlighting" else depth
+            if kind == "whitted":
+                self.report.add("integrator", "whitted", "volpath")
+            kind = "volpath"
+        self.lines.append(f'Integrator "{kind}" "integer maxdepth" [ {depth} ]')
         if sampler.kind == "stratified":
             self.lines.append(self.stratified_line(sampler.samples_per_pixel))
         else:
@@ -172,13 +195,32 @@ class PbrtWriter(PbrtSurfaceWriter, SceneWriter):
         """Lines of a shape and its material, without its placement."""
         material = instance.material
         emission = radiance_of(instance)
+        if is_nothing(material) and emission is None:
+            return [f'Material "{self.nothing}"', *self._sides(instance), self._shape(instance)]
         named = self.material(material.base if isinstance(material, Masked) else material)
         alpha = f" {self._alpha(material)}" if isinstance(material, Masked) else ""
-        lines = [f'NamedMaterial "{named}"']
+        lines = [f'NamedMaterial "{named}"', *self._sides(instance)]
         if emission is not None:
             both = ' "bool twosided" [ "true" ]' if shines_behind(instance) else ""
             lines.append(f'AreaLightSource "diffuse" "rgb L" {listed(emission)}{both}')
         return [*lines, f"{self._shape(instance)}{alpha}"]
+
+    def medium_line(self, medium: Medium, name: str) -> str:
+        parts = f'"rgb sigma_a" {listed(medium.absorption)} "rgb sigma_s" {listed(medium.scattering)}'
+        g = f' "float g" [ {number(medium.g)} ]' if medium.g else ""
+        return f'MakeNamedMedium "{name}" "string type" [ "homogeneous" ] {parts}{g}'
+
+    def around_camera(self) -> list[str]:
+        return [self._interface(None, self.medium)] if self.medium is not None else []
+
+    def _sides(self, instance: Instance) -> list[str]:
+        """The line of the media of both sides; all shapes need one if the camera is in a medium."""
+        needed = self.medium is not None or borders_media(instance)
+        return [self._interface(instance.interior, instance.exterior)] if needed else []
+
+    def _interface(self, inside: Medium | None, outside: Medium | None) -> str:
+        names = ("" if medium is None else self.media[medium] for medium in (inside, outside))
+        return "MediumInterface " + " ".join(f'"{name}"' for name in names)
 
     def _alpha(self, material: Masked) -> str:
         opacity = material.opacity

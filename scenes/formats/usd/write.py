@@ -34,6 +34,7 @@ from scenes.canonical import (
     Sphere,
 )
 from scenes.canonical.values import Matrix, RigidTrack
+from scenes.formats.appearance.media import without_media
 from scenes.formats.geometry.conventions import aspect_of
 from scenes.formats.geometry.meshed import about_middle, as_mesh, depends_on_uv, rectangle_mesh
 from scenes.formats.geometry.placing import has_two_sides, keys_from_zero, lose_undrawn_back, shines
@@ -62,6 +63,7 @@ class UsdWriter:
 
     def write(self, scene: Scene) -> None:
         """Writes a scene."""
+        scene = without_media(scene, self.report)
         if determinant(scene.camera.to_world) < 0.0:
             self.document.place(UsdGeom.Xform.Get(self.stage, ROOT), np.diag([-1.0, 1.0, 1.0, 1.0]))
         self._camera(scene.camera, scene.film)

@@ -1,0 +1,60 @@
+"""Media of a scene: which there are, and the scene without them for formats that have none."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+
+from scenes.canonical import Instance, Medium, Rgb, Scene, SceneError
+from scenes.formats.appearance.mixtures import is_nothing
+from scenes.formats.appearance.spectra import rgb
+from scenes.formats.losses import LossReport
+
+
+def filled(medium: Medium) -> Medium | None:
+    """The medium alone, or None for one that neither absorbs nor scatters."""
+    empty = max(medium.extinction) == 0.0
+    return None if empty else Medium(medium.absorption, medium.scattering, medium.g)
+
+
+def made_medium(absorption: Rgb, scattering: Rgb, g: float, where: str, factor: float = 1.0) -> Medium:
+    """A medium whose coefficients are multiplied by a factor.
+
+    Raises:
+        SceneError: a coefficient is negative or not finite, or ``g`` is out of range; the message gives the place.
+    """
+    try:
+        return Medium(rgb(factor * np.array(absorption)), rgb(factor * np.array(scattering)), g)
+    except SceneError as error:
+        raise SceneError(f"{where}: {error}") from None
+
+
+def media_of(scene: Scene) -> list[Medium]:
+    """The media of a scene, each once, in the order of their first use; that of the camera is the first."""
+    found = [scene.medium, *(side for one in scene.instances for side in (one.interior, one.exterior))]
+    return list(dict.fromkeys(medium for medium in found if medium is not None))
+
+
+def without_media(scene: Scene, report: LossReport) -> Scene:
+    """The scene without media and without invisible surfaces, for formats that have neither; media are reported."""
+    if scene.medium is not None:
+        report.add("camera", f"a medium around the camera ({_named(scene.medium)})")
+    kept = tuple(bare for one in scene.instances if (bare := _bare(one, report)) is not None)
+    return dataclasses.replace(scene, instances=kept, medium=None)
+
+
+def _bare(instance: Instance, report: LossReport) -> Instance | None:
+    where = instance.name or "shape"
+    for side, medium in (("inside", instance.interior), ("outside", instance.exterior)):
+        if medium is not None:
+            report.add(where, f"a medium {side} a surface ({_named(medium)})")
+    if is_nothing(instance.material) and instance.emission is None:
+        return None
+    if instance.interior is None and instance.exterior is None:
+        return instance
+    return dataclasses.replace(instance, interior=None, exterior=None)
+
+
+def _named(medium: Medium) -> str:
+    return "scattering" if medium.scatters else "absorbing"
