@@ -1,4 +1,4 @@
-"""Every light and every material in every pair of formats, compared by the pictures of the formats' own renderers.
+"""Every light, material and medium in every pair of formats, compared by the pictures of the formats' own renderers.
 
 A specimen is written in one format, converted to another, and both files are drawn. Mitsuba 3 draws files of Mitsuba 3
 and, with their tree upgraded, of Mitsuba 0.5; LuxCore draws those of LuxRender. PBRT, glTF and USD have no engine here:
@@ -20,6 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from analysis.command.progress import Task
+from analysis.conversion.media_specimens import fog, media_in_sun, media_under_sky
 from analysis.conversion.options import FORMATS_OF
 from analysis.conversion.peers import RenderedImage, rendered
 from analysis.conversion.specimens import CELL_PX, DISTANT, LAMPS, Specimens, distant, lamp, materials
@@ -76,6 +77,9 @@ GROUPS: dict[str, Callable[[], Specimens]] = {
     "materials": materials,
     **{name: partial(lamp, name) for name in LAMPS},
     **{name: partial(distant, name) for name in DISTANT},
+    "media": media_under_sky,
+    "media in the sun": media_in_sun,
+    "fog": fog,
 }
 """The scenes of the matrix by name."""
 
@@ -103,7 +107,7 @@ def matrix_rows(
         work = folder / name.replace(", ", "-").replace(" ", "-")
         work.mkdir(parents=True, exist_ok=True)
         found = GROUPS[name]()
-        rows += _rows(found, Gallery(work, samples, limit_s, found), formats)
+        rows += _rows(found, Gallery(work, samples * found.effort, limit_s, found), formats)
         task.advance()
     return rows
 

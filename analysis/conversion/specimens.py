@@ -138,10 +138,13 @@ def _sky_image() -> np.ndarray:
     return np.stack(parts, axis=-1).astype(np.float32)
 
 
+DIRECTION = (-0.36, -0.48, -0.8)
+"""Direction of the directional lights."""
+
 _SUN = (0.4, 0.3, 0.866)
 DISTANT: dict[str, Light] = {
-    "directional": DirectionalLight((-0.36, -0.48, -0.8), _POWER),
-    "directional, 5 degrees": DirectionalLight((-0.36, -0.48, -0.8), _POWER, 5.0),
+    "directional": DirectionalLight(DIRECTION, _POWER),
+    "directional, 5 degrees": DirectionalLight(DIRECTION, _POWER, 5.0),
     "environment, even": EnvironmentLight(np.array([[[1.0, 0.7, 0.4]]], np.float32)),
     "environment map": EnvironmentLight(_sky_image(), np.eye(4)[[2, 0, 1, 3]], 0.5),
     "sun": SunSky(_SUN, part="sun"),
@@ -163,6 +166,7 @@ class Specimens:
         sky: whether the light is none of the specimens.
         reach: half side of the middle of a cell that counts, in half cells.
         hidden: half side of the part of it that does not count, in half cells.
+        effort: factor of the number of samples, for noisy specimens.
     """
 
     scene: Scene
@@ -172,9 +176,10 @@ class Specimens:
     sky: bool = False
     reach: float = 0.3
     hidden: float = 0.0
+    effort: int = 1
 
 
-def _place(number: int, count: int) -> Matrix:
+def place_of_cell(number: int, count: int) -> Matrix:
     """Where a cell is, the first at the top left."""
     columns = min(COLUMNS, count)
     rows = -(-count // columns)
@@ -184,7 +189,10 @@ def _place(number: int, count: int) -> Matrix:
     return place
 
 
-def _scene(instances: list[Instance], lights: list[Light], count: int, depth: int) -> tuple[Scene, tuple[int, int]]:
+def scene_of_cells(
+    instances: list[Instance], lights: list[Light], count: int, depth: int
+) -> tuple[Scene, tuple[int, int]]:
+    """A scene that shows ``count`` cells from above, and the size of its picture, pixels."""
     columns = min(COLUMNS, count)
     rows = -(-count // columns)
     view = np.eye(4)
@@ -195,7 +203,8 @@ def _scene(instances: list[Instance], lights: list[Light], count: int, depth: in
     return made, (film.width_px, film.height_px)
 
 
-def _even_sky() -> EnvironmentLight:
+def even_sky() -> EnvironmentLight:
+    """Light of radiance one all around."""
     return EnvironmentLight(np.ones((1, 1, 3), np.float32))
 
 
@@ -203,11 +212,11 @@ def materials() -> Specimens:
     """Every material under an even sky of radiance one."""
     count = len(MATERIALS)
     found = {
-        name: Instance(shape, material, _place(number, count))
+        name: Instance(shape, material, place_of_cell(number, count))
         for number, (name, (material, shape)) in enumerate(MATERIALS.items())
     }
-    scene, size_px = _scene(list(found.values()), [_even_sky()], count, 16)
-    single = {name: _scene([one], [_even_sky()], 1, 16)[0] for name, one in found.items()}
+    scene, size_px = scene_of_cells(list(found.values()), [even_sky()], count, 16)
+    single = {name: scene_of_cells([one], [even_sky()], 1, 16)[0] for name, one in found.items()}
     return Specimens(scene, size_px, tuple(found), single, True)
 
 
@@ -226,7 +235,7 @@ def lamp(name: str) -> Specimens:
     """A light with a place above a floor between black walls."""
     found = LAMPS[name]
     shapes, lights = ([found], []) if isinstance(found, Instance) else ([], [found])
-    scene, size_px = _scene([*shapes, *_cell()], lights, 1, 1)
+    scene, size_px = scene_of_cells([*shapes, *_cell()], lights, 1, 1)
     return Specimens(scene, size_px, (name,), {name: scene}, reach=0.7, hidden=0.2)
 
 
@@ -235,9 +244,9 @@ def distant(name: str) -> Specimens:
     squares = []
     for number, (x, y) in enumerate(((0.0, 0.0), (0.6, 0.0), (-0.6, 0.0), (0.0, 0.6), (0.0, -0.6))):
         normal = np.array([x, y, math.sqrt(1.0 - x * x - y * y)])
-        place = _place(number, 5)
+        place = place_of_cell(number, 5)
         across = np.array([normal[2], 0.0, -normal[0]]) / math.hypot(normal[0], normal[2])
         place[:3, :3] = np.stack([across, np.cross(normal, across), normal], axis=1)
         squares.append(Instance(Rectangle(), Matte(_even(0.5)), place))
-    scene, size_px = _scene(squares, [DISTANT[name]], 5, 1)
+    scene, size_px = scene_of_cells(squares, [DISTANT[name]], 5, 1)
     return Specimens(scene, size_px, (name,) * 5, {name: scene})

@@ -162,7 +162,7 @@ class SceneWriter(SurfaceWriter):
             self._objects[key] = label
             lines = [f'\tObjectBegin "{label}"', *(f"\t\t{line}" for line in made), "\tObjectEnd"]
             if borders_media(instance):  # LuxCore's media go on behind the object
-                lines = ["\tAttributeBegin", *lines, "\tAttributeEnd"]
+                lines = ["\tAttributeBegin", *(f"\t{line}" for line in lines), "\tAttributeEnd"]
             self.lines += lines
         return f'ObjectInstance "{self._objects[key]}"'
 

@@ -27,6 +27,9 @@ _COEFFICIENTS = {"clear": ("absorption", ""), "homogeneous": ("sigma_a", "sigma_
                  "homogenous": ("sigma_a", "sigma_s")}  # fmt: skip
 """Kinds of volumes, with the parameters of absorption and scattering; the last is LuxCore's spelling."""
 
+SCHLICK = "as much by Schlick's phase function"
+"""How LuxRender and LuxCore scatter; at a g of 0.5 by up to 20 % less light sideways, and 7 % more backwards."""
+
 _INDEX = 1.5
 
 
@@ -78,6 +81,10 @@ class LuxMediaReader(SceneReader):
         if len(set(toward)) > 1:
             self.report.add(where, "a g of a medium for each colour", "their mean")
         made = made_medium(absorption, scattering, float(np.mean(toward)), where)
+        if made.g and made.scatters:
+            self.report.add(
+                where, f"scattering by Schlick's phase function with a g of {made.g:g}", "by Henyey and Greenstein"
+            )
         self._scatters |= made.scatters
         volume = _Volume(made.absorption, made.scattering, made.g, self._index(parameters))
         self.names.define(self.volumes, name, volume)

@@ -51,6 +51,7 @@ from scenes.formats.geometry.placing import (
 from scenes.formats.geometry.revolution import lamp_sphere
 from scenes.formats.geometry.transform_stack import inverse
 from scenes.formats.losses import LossReport, first_of
+from scenes.formats.luxrender.media import SCHLICK
 from scenes.formats.luxrender.read import SKY_UNIT, SPHERE_SR, SUN_UNIT, cone_sr
 from scenes.formats.luxrender.write_materials import LuxSurfaceWriter
 from scenes.formats.text.numbers import listed, number, written_matrix
@@ -210,6 +211,10 @@ class LuxWriter(LuxSurfaceWriter, SceneWriter):
         """The definition of a medium; LuxCore 2.10 reads volumes of the kind ``clear`` alone from these files."""
         if not medium.scatters:
             return f'MakeNamedVolume "{name}" "clear" "color absorption" {listed(medium.absorption)}'
+        if medium.g:
+            self.report.add(
+                f"medium {name!r}", f"scattering by Henyey and Greenstein with a g of {medium.g:g}", SCHLICK
+            )
         parts = f'"color sigma_a" {listed(medium.absorption)} "color sigma_s" {listed(medium.scattering)}'
         return f'MakeNamedVolume "{name}" "homogeneous" {parts} "color g" {listed((medium.g,) * 3)}'
 

@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import ClassVar
 
 import numpy as np
 
@@ -63,11 +62,9 @@ class PbrtWriter(PbrtSurfaceWriter, SceneWriter):
     """Collects the lines of a PBRT scene.
 
     Attributes:
-        nothing: kind of an invisible material.
         times_s: the times of all motions, seconds.
     """
 
-    nothing: ClassVar[str] = "none"
     times_s: tuple[float, float] = (0.0, 1.0)
 
     def write_times(self, scene: Scene) -> None:

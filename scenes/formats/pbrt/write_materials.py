@@ -6,6 +6,7 @@ Source: PBRT v3 file format (https://www.pbrt.org/fileformat-v3); Hagemann 2018,
 from __future__ import annotations
 
 import math
+from typing import ClassVar
 
 import numpy as np
 
@@ -28,7 +29,7 @@ from scenes.canonical.textures import WHITE
 from scenes.formats.appearance.facets import Facets
 from scenes.formats.appearance.folding import folded, product_of
 from scenes.formats.appearance.indices import mean_reflectance
-from scenes.formats.appearance.mixtures import dimmed
+from scenes.formats.appearance.mixtures import dimmed, is_nothing
 from scenes.formats.appearance.spectra import grey, rgb
 from scenes.formats.directives.surface_writer import SurfaceWriter, mixture_line
 from scenes.formats.text.numbers import number
@@ -40,8 +41,13 @@ PICTURES = (".exr", ".png", ".tga", ".pfm")
 
 
 class PbrtSurfaceWriter(SurfaceWriter):
-    """Collects the lines of textures and materials."""
+    """Collects the lines of textures and materials.
 
+    Attributes:
+        nothing: kind of an invisible material.
+    """
+
+    nothing: ClassVar[str] = "none"
     color_texture = "spectrum"
     color = "rgb"
 
@@ -55,6 +61,8 @@ class PbrtSurfaceWriter(SurfaceWriter):
         where = f"material {name!r}"
         if isinstance(material, Bumped):
             return self.bumped_line(material, name, "bumpmap")
+        if is_nothing(material):
+            return f'"string type" [ "{self.nothing}" ]'
         if isinstance(material, Masked):
             self.report.add(where, "holes in a material", "those of the shapes that have it")
             return self.material_line(material.base, name)
