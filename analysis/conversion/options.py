@@ -58,10 +58,12 @@ class CheckOptions:
     markers: bool = False
     """Check the places of known lamps in the pictures, from every format to every other."""
     matrix: bool = False
-    """Compare every light and every material in every pair of formats."""
+    """Compare every light, material and medium in every pair of formats."""
     formats: Annotated[
         tuple[str, ...], tyro.conf.arg(help=f"Formats of the matrix: {', '.join(FORMATS_OF)}; by default all.")
     ] = ()
+    groups: tuple[str, ...] = ()
+    """Scenes of the matrix: materials, media, "media in the sun", fog or lights by name; by default all."""
     mutations: int = 0
     """Change the scene files (by default the Cornell boxes) at random so many times, read each and count failures,
     instead of rendering. A run in the same folder goes on where an earlier one was."""

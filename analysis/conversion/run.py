@@ -16,6 +16,7 @@ from analysis.conversion.options import FORMATS_OF, CheckOptions, ConvertOptions
 from analysis.storage.files import write_json, write_table
 from analysis.storage.results import own_results
 from analysis.storage.summary import with_source, write_summary
+from tsar.config import require
 
 
 def convert(options: ConvertOptions) -> dict[str, Any]:
@@ -50,7 +51,9 @@ def check(options: CheckOptions) -> list[Table]:
     from analysis.conversion.matrix import GROUPS, matrix_rows, worst
     from analysis.conversion.mutations import summed
 
+    groups = options.groups or tuple(GROUPS)
     with bad_input():
+        require(set(groups) <= set(GROUPS), "groups", f"some of {', '.join(GROUPS)}", " ".join(groups))
         written = ("table.csv", "markers.csv", "pictures.jpg", "worst.csv", "matrix.csv", "markers/*",
                     "matrix/*", "[0-9][0-9]-*/*", "mutations.csv", "mutations.journal")  # fmt: skip
         own_results(options.out, written)
@@ -60,9 +63,8 @@ def check(options: CheckOptions) -> list[Table]:
         markers = marker_offsets(options.out / "markers", options.limit_s) if options.markers else []
         matrix = []
         if options.matrix:
-            given, task = (options.samples, options.limit_s), shown.task("matrix", len(GROUPS))
-            formats = options.formats or tuple(FORMATS_OF)
-            matrix = matrix_rows(options.out / "matrix", *given, task, formats=formats)
+            given, task = (options.samples, options.limit_s), shown.task("matrix", len(groups))
+            matrix = matrix_rows(options.out / "matrix", *given, task, groups, options.formats or tuple(FORMATS_OF))
         tables = {"table": rows, "markers": markers, "matrix": matrix, "worst": worst(matrix) if matrix else [],
                   "mutations": mutations}  # fmt: skip
         found = {name: part for name, part in tables.items() if part}

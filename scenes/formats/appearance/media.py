@@ -44,6 +44,14 @@ def without_media(scene: Scene, report: LossReport) -> Scene:
     return dataclasses.replace(scene, instances=kept, medium=None)
 
 
+def as_drawn_by(scene: Scene, integrator: str, where: str, report: LossReport) -> Scene:
+    """The scene of a file whose integrator does not draw media, so that the picture stays the same."""
+    if not media_of(scene):
+        return scene
+    report.hint(where, f"media, which the integrator {integrator!r} does not draw")
+    return without_media(scene, LossReport())
+
+
 def _bare(instance: Instance, report: LossReport) -> Instance | None:
     where = instance.name or "shape"
     for side, medium in (("inside", instance.interior), ("outside", instance.exterior)):

@@ -96,6 +96,10 @@ class SceneReader(DirectiveReader):
             "ObjectBegin": self._begin_object, "ObjectEnd": self._end_object, "ObjectInstance": self.place_object,
         }  # fmt: skip
 
+    def as_drawn(self, scene: Scene) -> Scene:
+        """The scene without what the integrator of the file does not draw."""
+        return scene
+
     def _begin_world(self, directive: Directive) -> None:
         self.transforms.replace(np.eye(4))
 
@@ -280,7 +284,7 @@ def scene_of(reader: SceneReader, path: Path) -> Scene:
         camera = PerspectiveCamera(FORWARD, 90.0)
     elif reader.window is not None:
         camera = fitted(camera, reader.window, reader.film, reader.report)
-    return Scene(
+    scene = Scene(
         camera,
         tuple(reader.instances),
         tuple(reader.lights),
@@ -292,3 +296,4 @@ def scene_of(reader: SceneReader, path: Path) -> Scene:
         name=Path(path).stem,
         duration_s=duration_s(camera, reader.instances),
     )
+    return reader.as_drawn(scene)

@@ -28,12 +28,11 @@ class MitsubaMedia:
 
     Attributes:
         modern: whether the file is one of Mitsuba 2 or 3.
-        any: whether there is a medium.
     """
 
     def __init__(self, report: LossReport, find: Callable[[XmlNode], XmlNode]) -> None:
         self.report, self.find = report, find
-        self.modern = self.any = False
+        self.modern = False
         self._made: dict[int, tuple[XmlNode, Medium | None]] = {}
 
     def read(self, node: XmlNode) -> Medium | None:
@@ -62,7 +61,6 @@ class MitsubaMedia:
                 self.report.hint(properties.where, f"{name} of a medium", "the renderer's own choice")
         made = filled(made_medium(absorption, scattering, g, properties.where, properties.number("scale", 1.0)))
         properties.left_over()
-        self.any |= made is not None
         return made
 
     def _preset(self, properties: Properties) -> Medium:

@@ -13,6 +13,7 @@ from scenes.canonical import (
     Scene,
     SceneError,
 )
+from scenes.formats.appearance.media import as_drawn_by
 from scenes.formats.geometry.conventions import duration_s
 from scenes.formats.losses import LossReport
 from scenes.formats.mitsuba.media import MitsubaMedia
@@ -201,8 +202,8 @@ def scene_of(reader: MitsubaReader, path: Path) -> Scene:
         report.add(str(path), "no sensor", "one that sees the shapes along z")
         reader.camera = seeing_all(reader.instances)
     parts = tuple(reader.instances), tuple(reader.lights.lights), reader.film, reader.sampler, reader.integrator
-    if reader.media.any and reader.drawn_by not in (_OF_MEDIA if reader.media.modern else _OF_MEDIA_0):
-        report.add(str(path), f"integrator {reader.drawn_by!r}, which draws no media", "one that draws them")
     lasts = duration_s(reader.camera, reader.instances)
-    return Scene(reader.camera, *parts, medium=reader.medium, materials=dict(reader.materials), name=Path(path).stem,
-                 duration_s=lasts)  # fmt: skip
+    scene = Scene(reader.camera, *parts, medium=reader.medium, materials=dict(reader.materials), name=Path(path).stem,
+                  duration_s=lasts)  # fmt: skip
+    drawn = reader.drawn_by in (_OF_MEDIA if reader.media.modern else _OF_MEDIA_0)
+    return scene if drawn else as_drawn_by(scene, reader.drawn_by, Path(path).name, report)

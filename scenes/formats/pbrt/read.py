@@ -12,7 +12,8 @@ from typing import ClassVar
 import numpy as np
 
 from scenes import loading
-from scenes.canonical import EnvironmentLight, Integrator, Rgb, Sampler
+from scenes.canonical import EnvironmentLight, Integrator, Rgb, Sampler, Scene
+from scenes.formats.appearance.media import as_drawn_by
 from scenes.formats.appearance.spectra import rgb
 from scenes.formats.directives import lights
 from scenes.formats.directives.reader import typed, word
@@ -69,11 +70,9 @@ class PbrtReader(SceneReader):
     def _read_medium(self, directive: Directive) -> None:
         self.left_over(self.media.make(directive), f"medium {word(directive)!r}")
 
-    def finish(self) -> None:
-        super().finish()
-        if self._drawn_by not in self.of_media and any(medium is not None for medium in self.media.named.values()):
-            what = f"integrator {self._drawn_by!r}, which draws no media"
-            self.report.add(str(self.files.main.name), what, "one that draws them")
+    def as_drawn(self, scene: Scene) -> Scene:
+        drawn = self._drawn_by in self.of_media
+        return scene if drawn else as_drawn_by(scene, self._drawn_by, self.files.main.name, self.report)
 
     def _read_film(self, directive: Directive) -> None:
         kind, parameters = typed(directive)

@@ -13,6 +13,7 @@ import pytest
 
 from analysis.command.progress import Task
 from analysis.conversion.matrix import BOUND, GROUPS, differences, losses, matrix_rows, read, worst
+from analysis.conversion.media_specimens import FOG, MEDIA, SCATTERING
 from analysis.conversion.options import FORMATS_OF
 from analysis.conversion.specimens import CELL_PX, DISTANT, LAMPS, MATERIALS
 from scenes.canonical import Material, Metal
@@ -23,7 +24,7 @@ SINGLE = {name: scene for make in GROUPS.values() for name, scene in make().sing
 
 def test_the_matrix_has_every_material_of_the_canonical_scene() -> None:
     assert set(get_args(Material)) == {type(material) for material, _ in MATERIALS.values()}
-    assert set(SINGLE) == {*MATERIALS, *LAMPS, *DISTANT}
+    assert set(SINGLE) == {*MATERIALS, *LAMPS, *DISTANT, *MEDIA, *SCATTERING, FOG}
 
 
 needs_usd = pytest.param("usd", marks=pytest.mark.skipif(find_spec("pxr") is None, reason="usd-core is missing"))
@@ -127,3 +128,20 @@ def test_point_lights_are_as_bright_in_every_pair(tmp_path: Path) -> None:
     pytest.importorskip("pxr")
     rows = matrix_rows(tmp_path, 64, 120.0, Task(), ("point",))
     assert len(rows) == 56 and all(row["note"] == "" and row["off"] < BOUND for row in rows), rows
+
+
+def _media_are_alike(folder: Path, samples: int, groups: tuple[str, ...], formats: tuple[str, ...]) -> None:
+    pytest.importorskip("mitsuba")
+    pytest.importorskip("pyluxcore")
+    for row in matrix_rows(folder, samples, 120.0, Task(), groups, formats):
+        lost = any("medium inside" in loss or "Schlick" in loss for loss in row["losses"])
+        assert not row["note"] and (lost or row["off"] < BOUND), row
+
+
+def test_media_are_as_bright_in_both_renderers(tmp_path: Path) -> None:
+    _media_are_alike(tmp_path, 16, ("media", "fog"), ("mitsuba3", "luxrender"))
+
+
+@pytest.mark.slow
+def test_media_are_as_bright_in_every_pair(tmp_path: Path) -> None:
+    _media_are_alike(tmp_path, 64, ("media", "media in the sun", "fog"), tuple(FORMATS_OF))

@@ -21,6 +21,7 @@ from scenes.canonical import (
     Sphere,
 )
 from scenes.formats.appearance.folding import height_of
+from scenes.formats.appearance.mixtures import is_nothing
 from scenes.formats.comparison import difference
 from scenes.formats.conversion import load_scene_file, save_scene_file
 from scenes.formats.losses import LossReport
@@ -44,13 +45,21 @@ def test_textures_are_upright_on_meshes_and_rectangles(file: str, tmp_path: Path
     assert len({tuple(np.round(wanted[y, x]).tolist()) for x in (10, 21) for y in (10, 21)}) == 4
 
 
-@pytest.mark.parametrize(("name", "file"), [
-    ("null-border-of-a-medium", "scene.pbrt"), ("null-border-of-a-medium", "scene.xml"),
-    ("one-sided-and-medium-defaults", "medium.xml")])  # fmt: skip
-def test_borders_of_media_are_not_seen(name: str, file: str) -> None:
+@pytest.mark.parametrize(("name", "file", "hint"), [
+    ("null-border-of-a-medium", "scene.pbrt", "media, which the integrator 'path' does not draw"),
+    ("null-border-of-a-medium", "scene.xml", "the border of a medium, which is invisible")])  # fmt: skip
+def test_borders_of_media_are_not_seen(name: str, file: str, hint: str) -> None:
     scene, lost = case(name, file)
     assert reflectances(scene) == [(0.9, 0.1, 0.1)] and scene.instances[0].shape == Sphere(0.6)
-    assert sum("the border of a medium, which is invisible: left out" in loss for loss in lost) == 1
+    assert sum(hint in loss for loss in lost) == 1
+
+
+def test_a_shape_of_mitsuba_0_5_with_a_medium_alone_is_its_border() -> None:
+    scene, lost = case("one-sided-and-medium-defaults", "medium.xml")
+    border, ball = scene.instances
+    assert len(lost) == 1 and "volpath" in lost[0]  # a hint
+    assert is_nothing(border.material) and border.interior is not None
+    assert sum(border.interior.extinction) == pytest.approx(0.03) and ball.shape == Sphere(0.6)
 
 
 def test_a_border_that_shines_is_kept(tmp_path: Path) -> None:

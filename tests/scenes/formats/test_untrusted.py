@@ -146,10 +146,10 @@ UNKNOWN = [
             ('Texture "t" "color" "cells" "float size" 2', "texture 'cells', which is not known: the constant 0.5"),
             ('AreaLightSource "glowing"', "area light 'glowing', which is not known: diffuse"),
             (
-                'MakeNamedMedium "fog" "string type" "homogeneous"',
-                "MakeNamedMedium 'fog' (participating medium): left out",
+                'MakeNamedMedium "fog" "string type" "cloud"',
+                "the medium 'fog' of the type 'cloud' (participating medium): left out",
             ),
-            ('MediumInterface "fog" ""', "MediumInterface 'fog' (participating medium): left out"),
+            ('MediumInterface "fog" ""', "the medium 'fog', which is not defined: vacuum"),
         )
     ),
     *(
@@ -162,7 +162,10 @@ UNKNOWN = [
                 '<emitter type="bulb"><float name="w" value="6"/></emitter>',
                 "emitter 'bulb', which is not known: left out",
             ),
-            ('<medium type="homogeneous" id="fog"/>', "medium 'fog' (participating medium): left out"),
+            (
+                '<medium type="heterogeneous" id="fog"/>',
+                "the medium 'fog' of the type 'heterogeneous' (participating medium): left out",
+            ),
             ('<integrator type="guess"/>', "integrator 'guess', which is not known: path"),
         )
     ),

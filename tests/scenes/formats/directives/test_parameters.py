@@ -41,6 +41,7 @@ class Dialect:
     samplers: str = "stratified halton"
     textures: str = ""
     mesh: str = "trianglemesh"
+    media: str = 'MakeNamedMedium "m" "string type" "homogeneous" {}\nMediumInterface "m" ""\n'
 
 
 DIALECTS = {
@@ -52,7 +53,9 @@ DIALECTS = {
     "luxrender": Dialect(".lxs", "fleximage", "path bidirectional directlighting exphotonmap igi",
                          "matte mirror glass glass2 roughglass metal metal2 glossy shinymetal mix mattetranslucent",
                          "Kd", "color", "color", "point spot distant infinite sun sky sky2 sunsky", "area",
-                         "lowdiscrepancy random metropolis sobol", "blackbody equalenergy", "mesh"),
+                         "lowdiscrepancy random metropolis sobol", "blackbody equalenergy colordepth", "mesh",
+                         'MakeNamedVolume "m" "clear" {}\nInterior "m"\nMaterial "glass2"\n|'
+                         'MakeNamedVolume "m" "homogeneous" {}\nInterior "m"\nMaterial "glass2"\n'),
 }  # fmt: skip
 HEADS = {"Camera": "perspective orthographic environment", "PixelFilter": "gaussian mitchell box triangle"}
 NOTHING = {
@@ -92,6 +95,9 @@ def texts(dialect: str) -> Iterator[str]:
     yield from (f'{bare}Material "{kind}" "float roughness" .2 {{}}\nShape "sphere"\n' for kind in materials)
     yield from (f'{bare}Shape "{kind}" {{}}\n' for kind in SHAPES)
     yield f'{bare}Shape "{found.mesh}" {{}} {POINTS}\n'
+    yield from (
+        f'{bare}{{}}Integrator "volpath"\n'.replace("{}", f'{one}Shape "sphere"\n') for one in found.media.split("|")
+    )
     if dialect == "pbrt4":
         yield f'{bare}Shape "bilinearmesh" {{}} {POINTS.replace("0 1 0 ]", "0 1 0 1 1 0 ]").replace("2 ]", "2 3 ]")}\n'
     use = f'Material "{materials[0]}" "texture {found.base}" "t"\nShape "sphere"\n'

@@ -54,6 +54,9 @@ def texts(version: str) -> Iterator[tuple[str, str]]:
             yield kind, f'<{tag} type="{kind}">{{}}</{tag}>' + ("" if tag == "shape" else ball.format(""))
     yield "envmap", '<emitter type="envmap"><string name="filename" value="a.png"/>{}</emitter>'
     yield "area", ball.format('<emitter type="area">{}</emitter>')
+    medium = '<integrator type="volpath"/>' + ball.format('<medium type="homogeneous" name="interior">{}</medium>')
+    yield "homogeneous", medium
+    yield "hg", medium.format('<phase type="hg">{}</phase>')
     film = '<sensor type="perspective"><film type="hdrfilm">{}</film></sensor>'
     yield "hdrfilm", film
     for kind in ("box", "tent", "gaussian", "mitchell", "lanczos"):

@@ -167,7 +167,7 @@ def test_lights(tmp_path: Path) -> None:
     <emitter type="spot"><transform name="toWorld"><lookat origin="0, 5, 0" target="0, 0, 0"/></transform></emitter>
     <emitter type="sunsky"><vector name="sunDirection" x="0" y="1" z="1"/><float name="turbidity" value="4"/></emitter>
     <emitter type="constant"><srgb name="radiance" value="#808080"/></emitter>
-    <medium type="homogeneous" id="fog"/>
+    <medium type="heterogeneous" id="fog"/>
     """
     scene, losses = mitsuba(tmp_path, body)
     sun, spot, sky, even = scene.lights

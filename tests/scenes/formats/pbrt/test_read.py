@@ -178,7 +178,7 @@ def test_lights_of_pbrt(tmp_path: Path) -> None:
     LightSource "distant" "point from" [0 0 9] "point to" [0 0 0] "rgb L" [1 2 3] "rgb scale" [2 2 2]
     LightSource "spot" "float coneangle" 40 "float conedeltaangle" 10 "rgb I" [1 1 1]
     LightSource "infinite" "blackbody L" [6500 2]
-    MakeNamedMedium "fog" "string type" "homogeneous"
+    MakeNamedMedium "fog" "string type" "heterogeneous"
     """
     scene, losses = pbrt(tmp_path, body)
     sun, spot, sky = scene.lights
