@@ -10,7 +10,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from analysis.conversion.specimens import DIRECTION, Specimens, even_sky, place_of_cell, scene_of_cells
+from analysis.conversion.specimens import AWAY, DIRECTION, Specimens, even_sky, place_of_cell, scene_of_cells
 from scenes.arithmetic import product
 from scenes.canonical import (
     ConstantTexture,
@@ -77,9 +77,12 @@ def _placed(found: dict[str, Instance]) -> dict[str, Instance]:
 def media(found: dict[str, Instance], light: Light) -> Specimens:
     """Shapes with media under a light."""
     placed = _placed(found)
-    scene, size_px = scene_of_cells(list(placed.values()), [light], len(placed), 16)
-    seen = Instance(Rectangle(), Matte(ConstantTexture((0.5, 0.5, 0.5))))  # glTF files without surfaces are refused
-    single = {name: scene_of_cells([one, seen], [light], 1, 16)[0] for name, one in placed.items()}
+    behind = np.eye(4)
+    behind[2, 3] = 1.2 * AWAY
+    # behind the camera, because files of glTF without surfaces are refused
+    more = Instance(Rectangle(), Matte(ConstantTexture((0.5, 0.5, 0.5))), behind)
+    scene, size_px = scene_of_cells([*placed.values(), more], [light], len(placed), 16)
+    single = {name: scene_of_cells([one, more], [light], 1, 16)[0] for name, one in placed.items()}
     sky = isinstance(light, EnvironmentLight)
     return Specimens(scene, size_px, tuple(placed), single, sky, reach=0.55, effort=4)
 
