@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from analysis.command.progress import Task
-from analysis.conversion.matrix import BOUND, GROUPS, differences, losses, matrix_rows, read, worst
+from analysis.conversion.matrix import BOUND, FINER, GROUPS, differences, losses, matrix_rows, read, worst
 from analysis.conversion.media_specimens import FOG, MEDIA, SCATTERING
 from analysis.conversion.options import FORMATS_OF
 from analysis.conversion.specimens import CELL_PX, DISTANT, LAMPS, MATERIALS
@@ -111,6 +111,27 @@ def test_differences_are_those_of_the_cells() -> None:
     assert off[names[1]][0] == pytest.approx(0.1, rel=1e-6)
     assert all(off[name][0] == 0.0 for name in names if name != names[1])
     assert math.isnan(differences(found, first, "no picture")["matte"][0])
+
+
+def test_pairs_that_differ_in_silence_are_drawn_again_with_more_samples(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The noise of few samples is no difference; that of a spot, whose loss is reported, is drawn once."""
+    asked: list[tuple[str, int]] = []
+
+    def noisy(program: str, file: Path, out: Path, size: tuple[int, int], samples: int, limit_s: float) -> np.ndarray:
+        asked.append((program, samples))
+        dark = 0.1 * (program == "luxcore" and samples == 4)
+        return np.full((size[1], size[0], 3), 1.0 - dark, np.float32)
+
+    monkeypatch.setattr("analysis.conversion.matrix.rendered", noisy)
+    rows = matrix_rows(tmp_path, 4, 1.0, Task(), ("point",), ("mitsuba3", "luxrender"))
+    assert {row["off"] for row in rows} == {0.0} and {samples for _, samples in asked} == {4, 4 * FINER}
+    asked.clear()
+    rows = matrix_rows(tmp_path, 4, 1.0, Task(), ("spot, hermite",), ("mitsuba3", "luxrender"))
+    across = [row for row in rows if {row["from"], row["to"]} == {"mitsuba3", "luxrender"}]
+    assert all(row["losses"] and row["off"] == pytest.approx(0.1, rel=0.2) for row in across)
+    assert {samples for _, samples in asked} == {4}
 
 
 def test_the_worst_pair_of_a_specimen_is_named() -> None:
