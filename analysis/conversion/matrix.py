@@ -10,7 +10,7 @@ from __future__ import annotations
 import dataclasses
 import hashlib
 import re
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 from analysis.command.progress import Task
 from analysis.conversion.media_specimens import fog, media_in_sun, media_under_sky
 from analysis.conversion.options import FORMATS_OF
-from analysis.conversion.peers import RenderedImage, rendered
+from analysis.conversion.peers import RenderedImage, drawn, rendered
 from analysis.conversion.specimens import CELL_PX, DISTANT, LAMPS, Specimens, distant, lamp, materials
 from scenes.canonical import Scene
 from scenes.formats.conversion import load_scene_file, save_scene_file
@@ -64,18 +64,28 @@ class Gallery:
     _drawn: dict[tuple[str, int], RenderedImage | str] = field(default_factory=dict)
     _again: dict[Path, Path] = field(default_factory=dict)
 
-    def picture(self, kind: str, file: Path, finer: int = 1) -> RenderedImage | str:
-        """The picture of a file of a format, with ``finer`` times the samples."""
+    def pictures(self, shown: Iterable[tuple[str, Path]], finer: int = 1) -> list[RenderedImage | str]:
+        """The pictures of files of formats, with ``finer`` times the samples."""
+        named = [self._named(kind, file) for kind, file in shown]
+        todo = {(name, engine): file for name, engine, file in named if (name, finer) not in self._drawn}
+        size_px, samples, limit_s = self.like.size_px, finer * self.samples, finer * self.limit_s
+        for program in dict.fromkeys(engine for _, engine in todo):
+            files = {self.folder / f"{name}-{finer}.npy": (name, file)
+                     for (name, engine), file in todo.items() if engine == program}  # fmt: skip
+            made = drawn(program, [(file, out) for out, (_, file) in files.items()], size_px, samples, limit_s)
+            for out, (name, file) in files.items():
+                found = made[out] if out in made else rendered(program, file, out, size_px, samples, limit_s)
+                self._drawn[name, finer] = found
+        return [self._drawn[name, finer] for name, _, _ in named]
+
+    def _named(self, kind: str, file: Path) -> tuple[str, str, Path]:
+        """A name for the content of a file, its renderer, and the file that this draws."""
         if kind not in ENGINES:
             if file not in self._again:
                 self._again[file] = file.with_name(f"{file.stem}-of-{kind}.xml")
                 save_scene_file(read(file, self.like.scene, self.like.sky), self._again[file], "mitsuba3")
             kind, file = "mitsuba3", self._again[file]
-        name = hashlib.blake2b(kind.encode() + file.read_bytes(), digest_size=8).hexdigest()
-        if (name, finer) not in self._drawn:
-            given = self.folder / f"{name}.npy", self.like.size_px, finer * self.samples, finer * self.limit_s
-            self._drawn[name, finer] = rendered(ENGINES[kind], file, *given)
-        return self._drawn[name, finer]
+        return hashlib.blake2b(kind.encode() + file.read_bytes(), digest_size=8).hexdigest(), ENGINES[kind], file
 
 
 GROUPS: dict[str, Callable[[], Specimens]] = {
@@ -139,13 +149,14 @@ def _rows(found: Specimens, gallery: Gallery, formats: tuple[str, ...]) -> Itera
         save_scene_file(scenes[source], file, target)
         if source == "scene":
             scenes[target] = read(file, found.scene, found.sky)
+    gallery.pictures((target, file) for (_, target), file in files.items())  # all at once
     for (source, target), file in files.items():
         pair = shown[source], (target, file)
-        off = differences(found, *(gallery.picture(*one) for one in pair))
+        off = differences(found, *gallery.pictures(pair))
         ways = {name: losses(one, source, target, gallery.folder, gone.setdefault(name, {}), found.sky)
                 for name, one in found.single.items()}  # fmt: skip
         if any(off[name][0] > BOUND and not lost and not undrawn for name, (lost, undrawn) in ways.items()):
-            off = differences(found, *(gallery.picture(*one, FINER) for one in pair))
+            off = differences(found, *gallery.pictures(pair, FINER))
         for name, (lost, undrawn) in ways.items():
             value, note = (float("nan"), undrawn) if undrawn else off[name]
             yield {"specimen": name, "from": source, "to": target, "off": value, "note": note, "losses": lost}

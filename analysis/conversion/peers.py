@@ -6,6 +6,8 @@ pixel, whatever filter a file asks for, so that pictures differ by the scene alo
 
 from __future__ import annotations
 
+import contextlib
+import json
 import subprocess
 import sys
 from pathlib import Path
@@ -131,6 +133,23 @@ os._exit(0)
 
 _PROGRAMS = {"mitsuba": _MITSUBA, "luxcore": _LUXCORE}
 
+_MODULES = {"mitsuba": "mitsuba", "luxcore": "pyluxcore"}
+
+# Imports of renderers are as long as small pictures take: processes of several pictures begin as copies of one.
+_SEVERAL = """
+import importlib, json, os, sys, numpy
+module, program, jobs = sys.argv[1], sys.argv[2], json.loads(sys.argv[3])
+importlib.import_module(module)
+for job in jobs:
+    if os.fork() == 0:
+        sys.argv[1:] = job
+        try:
+            exec(program, {"__name__": "__main__"})
+        finally:
+            os._exit(0)
+    os.wait()
+"""
+
 RenderedImage = NDArray[np.float32]
 
 
@@ -164,3 +183,25 @@ def rendered(
         lines = (done.stderr or done.stdout).strip().splitlines() or [f"exit code {done.returncode}"]
         return lines[-1].strip()[:160]
     return np.load(out)
+
+
+def drawn(
+    program: str, files: list[tuple[Path, Path]], size: tuple[int, int], samples: int, limit_s: float
+) -> dict[Path, RenderedImage]:
+    """The pictures of several files, by the files for the pictures, as :func:`rendered` draws them one by one; those
+    that the renderer does not make are missing.
+
+    Args:
+        program: ``mitsuba`` or ``luxcore``.
+        files: scenes, and files for their pictures.
+        size: width and height, pixels.
+        samples: samples per pixel.
+        limit_s: most seconds for each picture.
+    """
+    for _, out in files:
+        out.unlink(missing_ok=True)
+    jobs = json.dumps([[str(file), str(out), *map(str, (*size, samples, 0))] for file, out in files])
+    command = [sys.executable, "-c", _SEVERAL, _MODULES[program], _PROGRAMS[program], jobs]
+    with contextlib.suppress(subprocess.TimeoutExpired):
+        subprocess.run(command, capture_output=True, timeout=limit_s * len(files), check=False)
+    return {out: np.load(out) for _, out in files if out.is_file()}

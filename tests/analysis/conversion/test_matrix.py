@@ -119,12 +119,14 @@ def test_pairs_that_differ_in_silence_are_drawn_again_with_more_samples(
     """The noise of few samples is no difference; that of a spot, whose loss is reported, is drawn once."""
     asked: list[tuple[str, int]] = []
 
-    def noisy(program: str, file: Path, out: Path, size: tuple[int, int], samples: int, limit_s: float) -> np.ndarray:
+    def noisy(
+        program: str, files: list[tuple[Path, Path]], size: tuple[int, int], samples: int, limit_s: float
+    ) -> dict:
         asked.append((program, samples))
         dark = 0.1 * (program == "luxcore" and samples == 4)
-        return np.full((size[1], size[0], 3), 1.0 - dark, np.float32)
+        return {out: np.full((size[1], size[0], 3), 1.0 - dark, np.float32) for _, out in files}
 
-    monkeypatch.setattr("analysis.conversion.matrix.rendered", noisy)
+    monkeypatch.setattr("analysis.conversion.matrix.drawn", noisy)
     rows = matrix_rows(tmp_path, 4, 1.0, Task(), ("point",), ("mitsuba3", "luxrender"))
     assert {row["off"] for row in rows} == {0.0} and {samples for _, samples in asked} == {4, 4 * FINER}
     asked.clear()
