@@ -20,7 +20,7 @@ from scenes.canonical import ImageTexture, SceneError
 from scenes.canonical.values import Matrix
 from scenes.formats.appearance.pictured import as_file, in_bytes, number_codes, srgb_codes
 from scenes.formats.text.output import Output
-from scenes.models.usd_library import Gf, Tf, Usd, UsdGeom, Vt
+from scenes.models.usd_library import Gf, Sdf, Tf, Usd, UsdGeom, Vt
 
 Part = TypeVar("Part")
 
@@ -31,6 +31,7 @@ RATE = 24.0
 _SIDE_SHARP = 256
 _SIBLINGS = 256
 _ALIGNED, _HEADER = 64, 30  # bytes to which files in a package are aligned, and of a header before its name
+_UNMOVED = np.eye(4)
 _FIRST_DATE = (1980, 1, 1, 0, 0, 0)
 
 
@@ -56,12 +57,14 @@ class UsdStage:
         self._counts: dict[str, int] = {}
         self._groups: dict[str, str] = {}
         self._made: dict[Any, tuple[object, Any]] = {}
+        self._waiting: list[tuple[str, str, Matrix]] = []
 
     def path(self, name: str, below: str = ROOT) -> str:
         """A path that no prim has yet, below another; of many prims, which cost the library a time that grows with the
         square of their number, every 256 lie below a scope of their own."""
         count = self._counts[below] = self._counts.get(below, -1) + 1
         if count and count % _SIBLINGS == 0:
+            self.place_instances()
             self._groups[below] = self._free(f"{below}/more")
             self.stage.DefinePrim(self._groups[below], "Scope")
         return self._free(f"{self._groups.get(below, below)}/{Tf.MakeValidIdentifier(name)}")
@@ -87,10 +90,56 @@ class UsdStage:
         Raises:
             SceneError: the transform is not finite.
         """
-        if not np.isfinite(matrix).all():
-            raise SceneError(f"{self.target}: expected a finite transform of {prim.GetPath()}")
-        if not np.array_equal(matrix, np.eye(4)):
+        self.finite(matrix, f"others for a transform of {prim.GetPath()}")
+        if not np.array_equal(matrix, _UNMOVED):
             UsdGeom.Xformable(prim).AddTransformOp().Set(Gf.Matrix4d(matrix.T.tolist()))
+
+    def instance(self, path: str, prototype: str, matrix: Matrix) -> None:
+        """Adds an instance, when :meth:`place_instances` is called."""
+        self._waiting.append((path, prototype, matrix))
+
+    def place_instances(self) -> None:
+        """Writes the instances that were added, all at once, because the stage is composed again after each change.
+
+        Raises:
+            SceneError: a transform is not finite.
+        """
+        waiting, self._waiting = self._waiting, []
+        places = np.array([matrix for *_, matrix in waiting]).reshape(-1, 4, 4)
+        self.finite(places, "others for the transforms of instances")
+        moved = (places != _UNMOVED).any(axis=(1, 2))
+        poses = np.swapaxes(places, 1, 2).tolist()
+        layer, kinds = self.stage.GetRootLayer(), Sdf.ValueTypeNames
+        with Sdf.ChangeBlock():
+            for (path, prototype, _), pose, moves in zip(waiting, poses, moved.tolist(), strict=True):
+                prim = Sdf.CreatePrimInLayer(layer, path)
+                prim.specifier, prim.typeName, prim.instanceable = Sdf.SpecifierDef, "Xform", True
+                prim.referenceList.prependedItems.append(Sdf.Reference("", prototype))
+                if moves:
+                    move = Sdf.AttributeSpec(prim, "xformOp:transform", kinds.Matrix4d)
+                    move.default = Gf.Matrix4d(pose)
+                    order = Sdf.AttributeSpec(prim, "xformOpOrder", kinds.TokenArray, Sdf.VariabilityUniform)
+                    order.default = Vt.TokenArray(["xformOp:transform"])
+
+    def finite(self, values: Any, what: str) -> None:
+        """Checks numbers that are to be written.
+
+        Raises:
+            SceneError: one is not finite.
+        """
+        if not np.isfinite(values).all():
+            raise SceneError(f"{self.target}: expected finite numbers, got {what}")
+
+    def vectors(self, values: NDArray[Any], what: str, kind: str = "Vec3fArray") -> Any:
+        """Rows of numbers as an array of the library, which has single precision.
+
+        Raises:
+            SceneError: one of them is not finite, or beyond single precision.
+        """
+        with np.errstate(over="ignore"):
+            rows = np.ascontiguousarray(values, np.float32)
+        self.finite(rows, f"others for {what}")
+        return getattr(Vt, kind).FromNumpy(rows)
 
     def picture(self, texture: ImageTexture, numbers: bool) -> tuple[str, str]:
         """The file of a picture, relative to this one, and its colour space: 8 bits where they hold it, else EXR.
@@ -122,11 +171,10 @@ class UsdStage:
         """
         layer, path = self.stage.GetRootLayer(), self.output.path
         for prim in Usd.PrimRange.AllPrims(self.stage.GetPseudoRoot()):
-            for one in prim.GetAuthoredAttributes():
+            for one in () if prim.IsInstanceable() else prim.GetAuthoredAttributes():
                 value: Any = None if one.GetTypeName().isArray else one.Get()
-                number = isinstance(value, float | Gf.Vec2f | Gf.Vec3f | Gf.Vec4f)
-                if number and not np.isfinite(np.asarray(value)).all():
-                    raise SceneError(f"{self.target}: expected finite numbers, got {value} in {one.GetPath()}")
+                if isinstance(value, float | Gf.Vec2f | Gf.Vec3f | Gf.Vec4f):
+                    self.finite(np.asarray(value), f"{value} in {one.GetPath()}")
         if path.suffix.lower() == ".usda":
             self.output.text(path.name, layer.ExportToString())
             return
@@ -164,8 +212,3 @@ def sharp(texture: ImageTexture) -> ImageTexture:
     rows, columns = (max(1, _SIDE_SHARP // size) for size in texture.image.shape[:2])
     image = np.ascontiguousarray(np.repeat(np.repeat(texture.image, rows, axis=0), columns, axis=1))
     return ImageTexture(image, texture.uv_scale, texture.uv_offset, texture.wrap, "mipmap")
-
-
-def vectors(values: NDArray[Any], kind: str = "Vec3fArray") -> Any:
-    """Rows of numbers as an array of the library."""
-    return getattr(Vt, kind).FromNumpy(np.ascontiguousarray(values, np.float32))

@@ -30,7 +30,6 @@ from scenes.canonical import (
     PerspectiveCamera,
     Rectangle,
     Scene,
-    SceneError,
     Sphere,
 )
 from scenes.canonical.values import Matrix, RigidTrack
@@ -40,7 +39,7 @@ from scenes.formats.geometry.meshed import about_middle, as_mesh, depends_on_uv,
 from scenes.formats.geometry.placing import has_two_sides, keys_from_zero, lose_undrawn_back, shines
 from scenes.formats.losses import LossReport, without_settings
 from scenes.formats.text.output import Output
-from scenes.formats.usd.document import RATE, ROOT, UsdStage, packed, vectors
+from scenes.formats.usd.document import RATE, ROOT, UsdStage, packed
 from scenes.formats.usd.write_lights import UsdLightWriter, is_lamp_alone, strengthen
 from scenes.formats.usd.write_materials import UsdMaterialWriter
 from scenes.models.usd_library import Gf, Sdf, UsdGeom, UsdLux, UsdShade, Vt
@@ -67,9 +66,13 @@ class UsdWriter:
         if determinant(scene.camera.to_world) < 0.0:
             self.document.place(UsdGeom.Xform.Get(self.stage, ROOT), np.diag([-1.0, 1.0, 1.0, 1.0]))
         self._camera(scene.camera, scene.film)
-        self._counts = Counter(map(_shared_key, scene.instances))
-        for number, instance in enumerate(scene.instances):
-            self._instance(instance, instance.name.rpartition("/")[2] or f"{type(instance.shape).__name__}{number}")
+        keys = list(map(_shared_key, scene.instances))
+        self._counts = Counter(keys)
+        for number, (instance, key) in enumerate(zip(scene.instances, keys, strict=True)):
+            self._instance(
+                instance, key, instance.name.rpartition("/")[2] or f"{type(instance.shape).__name__}{number}"
+            )
+        self.document.place_instances()
         for light in scene.lights:
             self._lights.light(light)
         without_settings(scene, self.report)
@@ -91,6 +94,7 @@ class UsdWriter:
 
     def _mover(self, track: RigidTrack) -> str:
         """The path of a new transform with the motion of a track; motion begins at the time zero."""
+        self.document.place_instances()
         times_s, places, turns = keys_from_zero(track, self.report)
         prim = UsdGeom.Xform.Define(self.stage, self.document.path("motion"))
         move, turn = prim.AddTranslateOp(), prim.AddOrientOp(UsdGeom.XformOp.PrecisionDouble)
@@ -132,13 +136,14 @@ class UsdWriter:
 
     # --- shapes ------------------------------------------------------------------------------------------------------
 
-    def _instance(self, instance: Instance, name: str) -> None:
-        if is_lamp_alone(instance):
+    def _instance(self, instance: Instance, key: Any, name: str) -> None:
+        if key is None or self._counts[key] == 1:
+            self.document.place_instances()  # in the order of the scene
+        if key is None:
             path, matrix = self._place(name, instance.to_world, instance.track)
             self._lights.lamp(instance, path, matrix)
             return
         lose_undrawn_back(instance, name, self.report)
-        key = _shared_key(instance)
         if self._counts[key] == 1:
             path, matrix = self._place(name, instance.to_world, instance.track)
             self._shape(instance, path, matrix, name)
@@ -147,10 +152,7 @@ class UsdWriter:
             ("prototype", key), (instance.shape, instance.material), lambda: self._prototype(instance, name)
         )
         path, matrix = self._place(name, instance.to_world, instance.track)
-        made = UsdGeom.Xform.Define(self.stage, path)
-        made.GetPrim().GetReferences().AddInternalReference(prototype)
-        made.GetPrim().SetInstanceable(True)
-        self.document.place(made, matrix)
+        self.document.instance(path, prototype, matrix)
 
     def _prototype(self, instance: Instance, name: str) -> str:
         """The path of a class that instances share."""
@@ -198,25 +200,26 @@ class UsdWriter:
     def _mesh(self, mesh: Mesh, path: str, textured: bool) -> tuple[Any, Matrix | None]:
         """A mesh, and the place of its origin if that was moved."""
         points, middle = about_middle(mesh)
-        if not np.abs(points).max() <= np.finfo(np.float32).max:
-            raise SceneError(f"{self.document.target}: expected finite vertices of {path}")
         made = UsdGeom.Mesh.Define(self.stage, path)
-        made.CreatePointsAttr(vectors(points))
-        made.CreateExtentAttr(vectors(np.stack([points.min(axis=0), points.max(axis=0)])))
+        vectors = self.document.vectors
+        made.CreatePointsAttr(vectors(points, f"vertices of {path}"))
+        made.CreateExtentAttr(vectors(np.stack([points.min(axis=0), points.max(axis=0)]), f"the size of {path}"))
         made.CreateFaceVertexCountsAttr(Vt.IntArray(len(mesh.faces), 3))
         made.CreateFaceVertexIndicesAttr(Vt.IntArray.FromNumpy(np.ascontiguousarray(mesh.faces.ravel(), np.int32)))
         made.CreateSubdivisionSchemeAttr("none")
         if mesh.normals is not None:
-            made.CreateNormalsAttr(vectors(mesh.normals))
+            made.CreateNormalsAttr(vectors(mesh.normals, f"normals of {path}"))
             made.SetNormalsInterpolation("vertex")
         if textured and mesh.uvs is not None:
             kinds = Sdf.ValueTypeNames.TexCoord2fArray, "vertex"
-            UsdGeom.PrimvarsAPI(made).CreatePrimvar("st", *kinds).Set(vectors(mesh.uvs, "Vec2fArray"))
+            UsdGeom.PrimvarsAPI(made).CreatePrimvar("st", *kinds).Set(
+                vectors(mesh.uvs, f"texture coordinates of {path}", "Vec2fArray")
+            )
         return made, middle
 
 
 def _shared_key(instance: Instance) -> Any:
-    """A key that is equal for instances that share all but their place."""
+    """A key that is equal for instances that share all but their place; None for lamps of UsdLux."""
     if is_lamp_alone(instance):
         return None
     shape = id(instance.shape) if isinstance(instance.shape, Mesh) else instance.shape

@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 import sys
 import zipfile
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -225,6 +226,15 @@ def test_files_that_cannot_be_written_leave_nothing(tmp_path: Path, monkeypatch:
     for name in ("a.usda", "a.usdc", "a.usdz"):
         with pytest.raises(SceneError, match=f"^{re.escape(str(tmp_path / name))}: expected finite"):
             save_scene_file(Scene(PerspectiveCamera(), (far,)), tmp_path / name)
+    bad = np.full((3, 3), np.nan, np.float32)
+    bent = Instance(replace(TRIANGLE, normals=bad), GREY)
+    beyond = PointLight((float("inf"), 0.0, 0.0), (1.0, 1.0, 1.0))
+    for scene, where in (
+        (Scene(PerspectiveCamera(), (bent,)), "normals of /World/Mesh0"),
+        (shown(GREY, lights=(beyond,)), "a transform of /World/point"),
+    ):
+        with pytest.raises(SceneError, match=rf"a\.usda: expected finite numbers, got others for {where}"):
+            save_scene_file(scene, tmp_path / "a.usda")
     light = PointLight((0.0, 0.0, 0.0), (float("inf"), 1.0, 1.0))
     with pytest.raises(SceneError, match=r"a\.usdc: expected finite"):
         save_scene_file(shown(GREY, lights=(light,)), tmp_path / "a.usdc")
