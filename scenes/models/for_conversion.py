@@ -12,9 +12,21 @@ from pathlib import Path
 import numpy as np
 
 from scenes.arithmetic import product
-from scenes.canonical import Instance, Integrator, Masked, Material, Matte, Mesh, MetallicRough, NormalMapped, Scene
+from scenes.canonical import (
+    Emissive,
+    Instance,
+    Integrator,
+    Masked,
+    Material,
+    Matte,
+    Mesh,
+    MetallicRough,
+    NormalMapped,
+    Scene,
+)
 from scenes.canonical.values import Matrix, Rgb
 from scenes.formats.appearance.folding import mean_of
+from scenes.formats.appearance.mixtures import BLACK
 from scenes.formats.appearance.spectra import rgb
 from scenes.formats.geometry.placing import shines
 from scenes.formats.geometry.recognition import shape_of
@@ -58,6 +70,8 @@ class _Parts:
         """A material without its light, and the radiance of its front."""
         if isinstance(material, Masked | NormalMapped):
             base, emission = self._converted(material.base, where)
+            if isinstance(base, Emissive):  # of both sides, as its shape is
+                base, emission = BLACK, base.radiance
             return dataclasses.replace(material, base=base), emission
         if not isinstance(material, MetallicRough):
             return material, None

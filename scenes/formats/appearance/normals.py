@@ -13,10 +13,11 @@ _STRAIGHT = 0.5  # the value of a component that is zero
 
 def is_flat(material: NormalMapped) -> bool:
     """Whether the normal of the shape stays as it is everywhere."""
-    normals = folded(material.normals)
-    if material.scale == 0.0:
-        return True
-    return isinstance(normals, ConstantTexture) and normals.value[:2] == (_STRAIGHT, _STRAIGHT)
+    normals, untilted = folded(material.normals), material.scale == 0.0
+    if isinstance(normals, ConstantTexture):
+        across, down, out = normals.value
+        return out > _STRAIGHT and (untilted or across == down == _STRAIGHT)  # others point inwards
+    return untilted and not (isinstance(normals, ImageTexture) and (normals.image[..., 2] <= _STRAIGHT).any())
 
 
 def map_of(normals: Texture) -> Texture:

@@ -114,6 +114,8 @@ class ShapeReader:
         """Corners of triangles; each of LuxRender's quads is split into two."""
         found = [parameters.numbers(name) for name in ("indices", "triindices")]
         kept = [part for part in found if part is not None][:1]
+        if all(part is not None for part in found):
+            self.report.add(str(parameters.place), "triindices beside indices")
         quads = parameters.numbers("quadindices")
         if quads is not None:
             if len(quads) % 4:

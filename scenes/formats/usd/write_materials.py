@@ -25,8 +25,6 @@ from scenes.formats.usd.document import ROOT, UsdStage, sharp
 from scenes.models.usd_library import Gf, Sdf, UsdShade
 
 _COORDINATES = "st"
-_KINDS = {"float": "Float", "float2": "Float2", "float3": "Float3", "float4": "Float4", "color3f": "Color3f",
-          "normal3f": "Normal3f", "token": "Token", "asset": "Asset", "string": "String"}  # fmt: skip
 _ONE = (1.0, 1.0, 1.0)
 
 
@@ -165,10 +163,9 @@ class _Shader:
         factor, image = factored(texture, self.where, self.report)
         if image is None:
             return factor, None
-        if image.filter == "nearest" and max(image.image.shape[:2]) > 1:
-            self.report.add(self.where, "texels with sharp edges", "ones that are blurred at their edges")
         given = image
-        if given.filter == "nearest":
+        if given.filter == "nearest" and max(given.image.shape[:2]) > 1:
+            self.report.add(self.where, "texels with sharp edges", "ones that are blurred at their edges")
             finer = self.document.once(("sharp", id(given.image)), given, lambda: sharp(given)).image
             image = dataclasses.replace(given, image=finer, filter="mipmap", source="")
         if self.surface.normals is not None and min(given.uv_scale) < 0.0:
@@ -196,7 +193,7 @@ class _Shader:
 
     def _set(self, shader: Any, name: str, kind: str, value: Any) -> None:
         made = value if isinstance(value, str | float | Sdf.AssetPath) else getattr(Gf, f"Vec{len(value)}f")(*value)
-        shader.CreateInput(name, getattr(Sdf.ValueTypeNames, _KINDS[kind])).Set(made)
+        shader.CreateInput(name, Sdf.ValueTypeNames.Find(kind)).Set(made)
 
     def _connect(
         self, name: str, kind: str, image: ImageTexture, channels: str, values: tuple[Any, Any], numbers: bool
@@ -214,7 +211,7 @@ class _Shader:
         output = "Float3" if channels == "rgb" else "Float"
         made = reader.CreateOutput(channels, getattr(Sdf.ValueTypeNames, output))
         reader.CreateInput("st", Sdf.ValueTypeNames.Float2).ConnectToSource(self._coordinates(image))
-        self.shader.CreateInput(name, getattr(Sdf.ValueTypeNames, _KINDS[kind])).ConnectToSource(made)
+        self.shader.CreateInput(name, Sdf.ValueTypeNames.Find(kind)).ConnectToSource(made)
 
     def _coordinates(self, image: ImageTexture) -> Any:
         """The output of the texture coordinates, with the transform of a picture."""

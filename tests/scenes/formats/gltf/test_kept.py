@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from analysis.conversion.options import FORMATS_OF
 from renderer.frames import render_image
 from renderer.sampling.plan import SamplePlan
 from renderer.trace import Renderer
@@ -20,6 +21,7 @@ from scenes.canonical import (
     ImageTexture,
     Instance,
     Integrator,
+    Masked,
     Material,
     Matte,
     NormalMapped,
@@ -36,6 +38,7 @@ from tests.scenes.models.files import Gltf
 
 BEHIND = "a surface that shines on both sides"
 TILTED = ConstantTexture((0.8, 0.5, 0.9))
+INWARD = ImageTexture(np.full((2, 2, 3), (0.5, 0.5, 0.0), np.float32))
 
 
 def losses(report: LossReport) -> str:
@@ -125,3 +128,33 @@ def test_normals_that_bend_nothing_are_no_loss(material: Material, name: str, tm
     report = LossReport()
     save_scene_file(Scene(PerspectiveCamera(), (Instance(Rectangle(), material),)), tmp_path / name, None, report)
     assert "normal" not in losses(report)
+
+
+@pytest.mark.parametrize("ending", [".gltf", ".usda"])
+@pytest.mark.parametrize(
+    "material", [NormalMapped(GREY, ConstantTexture((0.5, 0.5, 0.0))), NormalMapped(GREY, INWARD, 0.0)]
+)
+def test_normals_that_point_inwards_are_kept(material: NormalMapped, ending: str, tmp_path: Path) -> None:
+    if ending == ".usda":
+        pytest.importorskip("pxr")
+    save_scene_file(Scene(PerspectiveCamera(), (Instance(Rectangle(), material),)), tmp_path / f"a{ending}")
+    found = load_scene_file(tmp_path / f"a{ending}").instances[0].material
+    assert isinstance(found, NormalMapped) and isinstance(found.normals, ImageTexture)
+    assert (found.normals.image[..., 2] < 0.01).all()
+
+
+@pytest.mark.parametrize("ending", [".gltf", ".usda"])
+@pytest.mark.parametrize("to", ["pbrt", "pbrt4", "mitsuba", "mitsuba3", "luxrender"])
+def test_glowing_surfaces_with_holes_keep_the_light_of_both_sides(ending: str, to: str, tmp_path: Path) -> None:
+    if ending == ".usda":
+        pytest.importorskip("pxr")
+    material = Masked(Emissive((3.0, 2.0, 1.0)), ConstantTexture((0.5,) * 3))
+    save_scene_file(Scene(PerspectiveCamera(), (Instance(Rectangle(), material),)), tmp_path / f"a{ending}")
+    read, report = load_scene_file(tmp_path / f"a{ending}"), LossReport()
+    assert (read.instances[0].emission, read.instances[0].emission_twosided) == ((3.0, 2.0, 1.0), True)
+    file = tmp_path / f"b{FORMATS_OF[to]}"
+    save_scene_file(read, file, to, report)
+    found = load_scene_file(file).instances[0]
+    assert found.emission == pytest.approx((3.0, 2.0, 1.0))
+    told = any(loss.what == "a surface that shines on both sides" for loss in report.losses)
+    assert found.emission_twosided or told

@@ -212,3 +212,11 @@ def test_cameras_of_other_kinds(tmp_path: Path) -> None:
         scene, _ = pbrt(tmp_path, "", HEAD.replace("perspective", kind))
         save_scene_file(scene, tmp_path / f"out{ending}")
         assert difference(scene, load_scene_file(tmp_path / f"out{ending}")) is None
+
+
+def test_triindices_beside_indices_are_a_loss(tmp_path: Path) -> None:
+    points = '"point P" [0 0 0 1 0 0 0 1 0 1 1 0]'
+    scene, lost = pbrt(
+        tmp_path, f'Shape "trianglemesh" "integer indices" [0 1 2] "integer triindices" [1 3 2] {points}\n'
+    )
+    assert len(scene.instances[0].shape.faces) == 1 and any("triindices beside indices" in loss for loss in lost)

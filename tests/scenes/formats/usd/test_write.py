@@ -136,6 +136,7 @@ def test_lamps_keep_their_sides_and_normals_of_one_direction_their_tilt(tmp_path
     assert [one.material for one in read.instances[:3]] == [Emissive((2.0, 2.0, 2.0)), BLACK, GREY]
     bent = read.instances[3].material
     assert isinstance(bent, NormalMapped) and isinstance(bent.normals, ImageTexture)
+    assert bent.normals.image.shape == (1, 1, 3), "one texel is not enlarged"
     np.testing.assert_allclose(bent.normals.image[0, 0], (0.7, 0.5, 0.9), atol=1e-6)
     _, losses = back(tmp_path, Scene(PerspectiveCamera(), (Instance(Rectangle(), GREY, one_sided=True),)), "b.usda")
     assert losses == ["Rectangle0: a surface with a black back: not drawn from behind"]
