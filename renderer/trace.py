@@ -19,7 +19,7 @@ from renderer.grids import grid_frame
 from renderer.kernels import entry as kernels
 from renderer.kernels import packets as packet_kernels
 from renderer.kernels.bundles import stack_size
-from renderer.layout.features import ALL, PACKETS, Feature
+from renderer.layout.features import ALL, PACKETS, RANDOM, Feature
 from renderer.layout.sizes import BLOCK_PX
 from renderer.layout.structs import Ray, SceneData, ViewData
 from renderer.singles import SingleSamples
@@ -47,6 +47,7 @@ class Renderer:
         footprint_resolution_px: number of pixels along the shorter image axis for which :meth:`trace` filters textures.
         features: features for which kernels are compiled.
         packets: whether sixteen samples are traced at a time.
+        random: whether samples draw random numbers: for a lens, extended lights, glossy rays or paths.
         scene, buffers: scene that is traced, moved near the origin, and its tables on the device.
     """
 
@@ -121,6 +122,7 @@ class Renderer:
         if not self.packets:  # these are compiled for the scene, now that it is known to be supported
             devices.load_kernels(self._kernels.module, self.device)
         data = self.buffers.data
+        self.random = bool(needed & RANDOM)
         data.throughput_cutoff, data.seed = float(throughput_cutoff), wp.uint32(seed)
         self._work = np.zeros(2, np.int64) if count_work else None
         self._stack_size = stack_size(self.features, data.depth, data.reflection_rays, data.refraction_rays)

@@ -56,6 +56,7 @@ class Setting:
         truth: true picture at any time; None where no policy may use it.
         trace: renderer that is not charged, for policies that use the truth.
         view: poses of the camera and all instances at a time in seconds; None where the scene does not give them.
+        random: whether the renderer draws random numbers for its samples, so that those of one place differ.
     """
 
     config: TsarConfig
@@ -63,6 +64,7 @@ class Setting:
     truth: Truth | None = None
     trace: Trace | None = None
     view: Callable[[float], Viewpoint] | None = None
+    random: Callable[[], bool] = lambda: False
 
 
 @dataclass(frozen=True)

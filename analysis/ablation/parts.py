@@ -25,6 +25,7 @@ _SWITCHED_OFF = {
     "prediction": "shown where it was last known to be",
     "shadows": "no change expected where shadows move",
     "probes": "no tile looks where nothing is expected",
+    "noise": "noise is blended as detail is",
 }
 _CYCLES, _FINE, _PIXEL = 3, 2, 1
 

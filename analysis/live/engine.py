@@ -44,6 +44,10 @@ class _Sharpened:
     renderer: Renderer
     footprint_px: float
 
+    @property
+    def random(self) -> bool:
+        return self.renderer.random
+
     def trace(self, batch: FrameletBatch, aspect: float = 1.0) -> SampleBatch:
         return self.renderer.trace(batch, aspect, self.footprint_px)
 

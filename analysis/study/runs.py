@@ -31,6 +31,8 @@ if TYPE_CHECKING:
 class Tracer(Protocol):
     """A renderer as runs see it: :class:`renderer.trace.Renderer`, or what stands for one."""
 
+    @property
+    def random(self) -> bool: ...
     def trace(self, batch: FrameletBatch, aspect: float = ...) -> SampleBatch: ...
     def viewpoint(self, time_s: float, aspect: float = ...) -> Viewpoint: ...
 
@@ -241,6 +243,7 @@ def made(
         truth,
         lambda batch: renderer_of(1).trace(batch, aspect),
         lambda time_s: renderer_of(1).viewpoint(time_s, aspect),
+        lambda: renderer_of(1).random,
     )
     make: Callable[[Setting], Policy[Any]] = partial(_changed, parts=parts) if parts else POLICIES[name]
     policy = Stored(setting, make, formats) if formats else make(setting)

@@ -10,6 +10,7 @@ import atexit
 import threading
 import time
 from collections.abc import Sequence
+from itertools import pairwise
 
 import numpy as np
 import torch
@@ -105,3 +106,9 @@ TEAM = Team()
 """The team of this process."""
 
 atexit.register(TEAM.rest)
+
+
+def shares(rows: int, threads: int) -> list[tuple[int, int]]:
+    """Range of rows (end exclusive) of each thread that has any."""
+    edges = [rows * number // threads for number in range(threads + 1)]
+    return [(first, last) for first, last in pairwise(edges) if last > first]

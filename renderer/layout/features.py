@@ -63,6 +63,17 @@ PACKETS = (
 )
 """Features that the packets of ``native/`` support."""
 
+RANDOM = (
+    Feature.LENS
+    | Feature.GLOSSY
+    | Feature.SUN_DISC
+    | Feature.QUAD
+    | Feature.SPHERE_LIGHT
+    | Feature.ENVIRONMENT
+    | Feature.PATHS
+)
+"""Features for which a sample draws random numbers."""
+
 MEANING = {
     Feature.MESH: "triangle meshes",
     Feature.SPHERE: "spheres",

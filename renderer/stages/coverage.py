@@ -52,8 +52,8 @@ FilterStageName = Literal["chosen", "taken_in"]
 _OPTIONS: Mapping[str, tuple[bool, ...] | None] = dict.fromkeys(
     (
         *("reprojection", "prediction", "smoothing", "accumulation", "jitter", "by_gain", "spread", "shadows"),
-        *("probes", "latency_cycles", "wavelets", "share_max", "footprint", "life_min_s", "life_max_s", "reach"),
-        "memory_s",
+        *("probes", "noise", "latency_cycles", "wavelets", "share_max", "footprint"),
+        *("life_min_s", "life_max_s", "reach", "memory_s"),
     )
 )
 _OPTIONS_OF: Mapping[FilterStageName, Mapping[str, tuple[bool, ...] | None]] = {

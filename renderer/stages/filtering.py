@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import fields
-from itertools import pairwise
 from math import inf
 
 import numpy as np
@@ -12,7 +11,7 @@ from torch import Tensor
 
 from renderer.compute.launching import Command, NativeRecord, address
 from renderer.compute.memory import Memory, Recycled
-from renderer.compute.team import TEAM
+from renderer.compute.team import TEAM, shares
 from renderer.stages import filtering_kernels as kernels
 from renderer.stages import picture_kernels
 from renderer.stages.poses import pose_words, rows_of
@@ -61,7 +60,7 @@ class _Compiled:
             plan.height, plan.width = picture
             plan.motion, plan.aged, plan.depth, plan.source, plan.front = motion, aged, depth, source, front
             plan.slot, plan.pixel = slot, pixel
-        self._rows = _shares(side, threads)
+        self._rows = shares(side, threads)
         self._bands = np.zeros((len(self._rows), 5), np.int64)  # surfels::Band
         for number, (first, last) in enumerate(self._rows):
             least = room(f"least {number}", (last - first + 4) * (side + 4), _I64)
@@ -141,9 +140,9 @@ class _Compiled:
         self._batch.set(*where, tiles, *own, *changes, *self._samples, *poses[0], *poses[1], *moment, *map(int, flags))
         perspective = view is None or view.kind == "perspective"
         locate = self._locate[perspective]
-        for command, (first, last) in zip(locate, _shares(tiles, len(locate)), strict=False):
+        for command, (first, last) in zip(locate, shares(tiles, len(locate)), strict=False):
             command.set(first, last)
-        TEAM.run(locate[: len(_shares(tiles, len(locate)))])
+        TEAM.run(locate[: len(shares(tiles, len(locate)))])
         for commands in (self._gather, self._learn, self._take_in):
             TEAM.run(commands)
         return Estimates(*planes[:5]), Surfels(*planes[5:]), Change(*after[:4])
@@ -197,19 +196,23 @@ class _Compiled:
         return after
 
     def displayed(
-        self, estimates: Estimates, surfels: Surfels | None, rate: Tensor, seconds: float
+        self,
+        estimates: Estimates,
+        surfels: Surfels | None,
+        rate: Tensor,
+        seconds: float,
+        between: Tensor | None = None,
     ) -> tuple[Tensor, Tensor]:
         """Like :func:`tsar.filtering.display.displayed`."""
-        rate = rate.contiguous()
-        names = ["color", "roughness", "aged", "inverse"]
-        planes = [getattr(estimates, name).contiguous() for name in names]
-        if surfels is not None:
-            names, planes = [*names, "position"], [*planes, surfels.position.contiguous()]
-        at = {name: self._address(name, plane) for name, plane in zip(names, planes, strict=True)}
+        planes = {name: getattr(estimates, name) for name in ("color", "roughness", "aged", "inverse")}
+        planes |= {"between": planes["roughness"] if between is None else between}
+        planes |= {"position": surfels.position} if surfels is not None else {}
+        rate, planes = rate.contiguous(), {name: plane.contiguous() for name, plane in planes.items()}
+        at = {name: self._address(name, plane) for name, plane in planes.items()}
         block = self._pictures.block().view(_F32)
         where, (variance, levels) = address("picture", block, _F32, 4 * self._pixels), self._room
         self._picture[:] = [
-            at["color"], at["roughness"], variance,
+            at["color"], at["between"], variance,
             at["aged"], at["inverse"], at["roughness"], self._elements(rate), at.get("position", 0),
             levels, where, where + 4 * 3 * self._pixels, self._width, self._height,
         ]  # fmt: skip
@@ -228,7 +231,7 @@ class _Compiled:
         room, pixels = self._memory.room, self._pixels
         self._samples = [room("at", pixels, torch.int32), *(room(f"samples {k}", pixels) for k in range(5))]
         self._batch = NativeRecord("6Q Q 9Q 8Q 6Q Qqdd Qqdd 3d 3q")  # batches::Batch
-        rows = [(ELEMENT_PX * a, ELEMENT_PX * b) for a, b in _shares(self._side // ELEMENT_PX, threads)]
+        rows = [(ELEMENT_PX * a, ELEMENT_PX * b) for a, b in shares(self._side // ELEMENT_PX, threads)]
         sums = [room(f"sums {number}", 9 * (self._side + 16)) for number in range(len(rows))]
         self._parts = np.array(
             [(*share, 0, at) for share, at in zip(rows, sums, strict=True)], np.int64
@@ -250,7 +253,7 @@ class _Compiled:
         self._found = np.zeros(1, np.int32)
         gains, taken = address("gains", self._gains, _F64, total), address("taken", self._taken, torch.bool, total)
         fixed = self._side, sides[0], len(sides), self._spacings[0], gains
-        self._gain = [Command(picture_kernels.gain, *fixed, *rows) for rows in _shares(sides[0], threads)]
+        self._gain = [Command(picture_kernels.gain, *fixed, *rows) for rows in shares(sides[0], threads)]
         found = address("found", self._found, torch.int32, 1)
         most = self._memory.room("most", total, _F64)
         self._best = Command(picture_kernels.best, gains, len(sides), sides[0], most, taken, found)
@@ -263,7 +266,7 @@ class _Compiled:
         self._room = self._memory.room("variance", pixels), self._memory.room("levels", levels)
         picture = address("picture", self._picture, _I64, 13)
         spare = [self._memory.room(f"spare {number}", 16 * side) for number in range(threads)]
-        rows = list(enumerate(_shares(-(-self._height // 2), threads)))
+        rows = list(enumerate(shares(-(-self._height // 2), threads)))
         self._shrink = [Command(picture_kernels.shrink, picture, side, *share, spare[number]) for number, share in rows]
         self._show = [Command(picture_kernels.show, picture, side, *share, spare[number]) for number, share in rows]
         self._smooth = Command(
@@ -287,12 +290,6 @@ class _Compiled:
     def _address(self, name: str, plane: Tensor) -> int:
         planes, kind = _KINDS.get(name, (1, _F32))
         return address(name, plane, kind, planes * self._pixels)
-
-
-def _shares(rows: int, threads: int) -> list[tuple[int, int]]:
-    """Range of rows (end exclusive) of each thread that has any."""
-    edges = [rows * number // threads for number in range(threads + 1)]
-    return [(first, last) for first, last in pairwise(edges) if last > first]
 
 
 def _planes(estimates: Estimates, surfels: Surfels) -> list[Tensor]:

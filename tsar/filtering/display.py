@@ -16,10 +16,12 @@ def displayed(
     surfels: Surfels | None,
     rate: Float[Tensor, "1 e e"],
     seconds: float,
+    between: Float[Tensor, "1 h w"] | None = None,
     picture: tuple[int, int] | None = None,
 ) -> tuple[Float[Tensor, "3 h w"], Float[Tensor, "1 h w"]]:
     """Picture and variance of its errors ``seconds`` later, :func:`smoothed`. The surfels belong to the estimates; None
-    without reprojection. Pixels of the greatest variance do not contribute to their surroundings. ``picture`` is the
+    without reprojection. ``between`` is the roughness between pixels where it is not that of the samples. Pixels of the
+    greatest variance do not contribute to their surroundings. ``picture`` is the
     height and width of the picture where it is not the whole plane: both results are 0 outside it, and nothing outside
     contributes."""
     later = estimates.later(rate, seconds)
@@ -27,10 +29,11 @@ def displayed(
         later = later.beside(surfels)
     variance = later.variance
     variance = torch.where(variance < VARIANCE_MAX, variance, NOTHING_KNOWN)
+    between = later.roughness if between is None else between
     if picture is None:
-        return smoothed(later.color, variance, later.roughness)
+        return smoothed(later.color, variance, between)
     (height, width), side = picture, variance.shape[-1]
-    shown, remaining = smoothed(*(plane[:, :height, :width] for plane in (later.color, variance, later.roughness)))
+    shown, remaining = smoothed(*(plane[:, :height, :width] for plane in (later.color, variance, between)))
     beyond = (0, side - width, 0, side - height)
     return F.pad(shown, beyond), F.pad(remaining, beyond)
 

@@ -39,6 +39,7 @@ class FilterOptions:
         shadows: whether change is expected in the shadows of moving objects.
         probes: whether some tiles sample places where no change is expected.
         latency_cycles: cycles from the start of a cycle to the display of its picture, at least 1.
+        noise: whether noise is told from detail, in scenes whose samples draw random numbers.
         wavelets: whether roughness and change are measured by the wavelets of the dissertation.
         share_max: maximum number of samples of a cycle, as a share of the output's pixels; a larger batch is divided
             into several cycles.
@@ -57,6 +58,7 @@ class FilterOptions:
     spread: bool = True
     shadows: bool = True
     probes: bool = True
+    noise: bool = True
     latency_cycles: int = 1
     wavelets: bool = False
     share_max: float = 1.0 / 32.0

@@ -36,7 +36,7 @@ class FilterStages:
         taken_in
     )
     drifted: Callable[[Tensor, Tensor, Hits, Viewpoint, Viewpoint, float], Tensor] = drifted
-    displayed: Callable[[Estimates, Surfels | None, Tensor, float], tuple[Tensor, Tensor]] = displayed
+    displayed: Callable[[Estimates, Surfels | None, Tensor, float, Tensor | None], tuple[Tensor, Tensor]] = displayed
 
 
 REFERENCE = FilterStages()

@@ -16,6 +16,7 @@ from torch import Tensor
 
 from tsar.filtering import densities
 from tsar.filtering.records import DEFAULT, ELEMENT_PX, TILE_SIDE, FilterOptions
+from tsar.policies.filter import PIXEL_FLOPS as OF_GAINS
 from tsar.policies.filter import Filter, State
 from tsar.policy import Moment, Price, Setting, require_square
 
@@ -47,7 +48,8 @@ class ByDensities(Filter):
 
     @property
     def price(self) -> Price:
-        return replace(super().price, pixel_flops=PIXEL_FLOPS)
+        price = super().price
+        return replace(price, pixel_flops=price.pixel_flops + PIXEL_FLOPS - OF_GAINS[True])
 
     def start(self) -> DenseState:
         """The initial credit is a seeded permutation in [0, 1), as in :func:`tsar.selection.initial_history`."""

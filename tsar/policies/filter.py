@@ -23,7 +23,7 @@ from torch import Tensor
 
 from tsar.clock import StageTimer
 from tsar.error import replace_nonfinite
-from tsar.filtering import samples, shadows, tiles
+from tsar.filtering import noise, samples, shadows, tiles
 from tsar.filtering.batches import Traced
 from tsar.filtering.records import (
     DEFAULT,
@@ -104,6 +104,7 @@ class Filter(Policy[State]):
         stages = setting.stages_of(self.config)
         self._stages, self._own_threads = stages.filtering, stages.own_threads
         self._view = setting.view if options.reprojection else None
+        self._noisy = options.noise and options.smoothing and setting.random()
         most = int(options.share_max * self.config.pixels) // TILE_SIDE**2
         asked = self.config.batch_size * self.config.samples // TILE_SIDE**2
         self._tiles = max(1, min(asked, most))
@@ -134,9 +135,8 @@ class Filter(Policy[State]):
 
     @property
     def price(self) -> Price:
-        return Price(
-            self._tiles * TILE_SIDE**2, pixel_flops=PIXEL_FLOPS[self._options.reprojection], sample_flops=SAMPLE_FLOPS
-        )
+        pixel_flops = PIXEL_FLOPS[self._options.reprojection] + noise.PIXEL_FLOPS * self._noisy
+        return Price(self._tiles * TILE_SIDE**2, pixel_flops=pixel_flops, sample_flops=SAMPLE_FLOPS)
 
     def start(self) -> State:
         side = self._side
@@ -192,7 +192,7 @@ class Filter(Policy[State]):
     def _carried(self, state: State, moment: Moment, image: Float[Tensor, "h w 3"]) -> Float[Tensor, "h w 3"]:
         """The picture that would be shown if all estimates had these colours, with the same variances."""
         color = image.permute(2, 0, 1).clamp(0.0, samples.COLOR_MAX).contiguous()
-        shown = self._displayed(replace(state, estimates=replace(state.estimates, color=color)), moment).shown
+        shown = self._displayed(state, moment, color).shown
         return shown.permute(1, 2, 0).contiguous()
 
     def _advanced(self, state: State, moment: Moment) -> State:
@@ -269,13 +269,16 @@ class Filter(Policy[State]):
     def _rate(self, observed: Change, drift_s: Float[Tensor, "1 e e"]) -> Float[Tensor, "1 e e"]:
         return torch.maximum(observed.rate, shadows.expected_rate(drift_s, self._options.reach))
 
-    def _displayed(self, state: State, moment: Moment) -> State:
-        surfels = state.reprojected
+    def _displayed(self, state: State, moment: Moment, color: Float[Tensor, "3 h w"] | None = None) -> State:
+        surfels, estimates = state.reprojected, state.estimates
+        between = noise.detailed(estimates, self.config.shape) if self._noisy else None
+        if color is not None:
+            estimates = replace(estimates, color=color)
         if not self._options.smoothing:
-            later = state.estimates.later(state.rate, moment.cycle_s)
+            later = estimates.later(state.rate, moment.cycle_s)
             later = later if surfels is None else later.beside(surfels)
             return replace(state, shown=later.color, remaining=self._window.inside(later.variance))
-        shown, remaining = self._stages.displayed(state.estimates, surfels, state.rate, moment.cycle_s)
+        shown, remaining = self._stages.displayed(estimates, surfels, state.rate, moment.cycle_s, between)
         return replace(state, shown=shown, remaining=remaining)
 
 

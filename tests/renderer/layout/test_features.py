@@ -122,6 +122,12 @@ def test_driving_scenes_are_traced_in_packets_and_effects_beyond_them_are_not() 
     assert required(effects.load("glass")) | PACKETS != PACKETS
 
 
+@pytest.mark.parametrize("name, random", [("fly-by", False), ("glass", False), ("depth-of-field", True)])
+def test_a_renderer_says_whether_samples_are_random(name: str, random: bool) -> None:
+    scene = catalog.load(name) if name in catalog.NAMES else effects.load(name)
+    assert Renderer(scene, specialise=False).random is random
+
+
 def test_the_number_of_sets_is_bounded(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(kernels, "SETS_MAX", 2)
     monkeypatch.setattr(kernels, "_asked", set())

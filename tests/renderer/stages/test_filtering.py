@@ -98,7 +98,8 @@ def test_pictures_are_those_of_the_reference(side: int, threads: int) -> None:
     compiled = filter_stages(side, threads)
     for seed in range(4):
         estimates, surfels, _ = scene(side, "perspective", seed)
-        arguments = estimates, surfels if seed % 2 else None, rates(side, seed), 0.02 * seed
+        between = planes(side, seed + 20)[2] if seed > 1 else None
+        arguments = estimates, surfels if seed % 2 else None, rates(side, seed), 0.02 * seed, between
         for ours, theirs in zip(compiled.displayed(*arguments), REFERENCE.displayed(*arguments), strict=True):
             assert torch.equal(ours, theirs)
 

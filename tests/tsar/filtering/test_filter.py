@@ -163,8 +163,11 @@ class Counting(TorchDispatchMode):
         return made
 
 
-@pytest.mark.parametrize("name", ["tsar", "filter", "tsar-densities", "surfel"])
-def test_the_price_is_what_the_code_counts(name: str) -> None:
+PRICED = "tsar", "filter", "tsar-densities", "surfel"
+
+
+@pytest.mark.parametrize("name, noisy", [(name, False) for name in PRICED] + [("tsar", True)])
+def test_the_price_is_what_the_code_counts(name: str, noisy: bool) -> None:
     """Operations of a cycle in its steady state, at a size at which samples are few beside pixels. The reference takes
     a batch in everywhere, compiled stages where its samples lie."""
     config = replace(CONFIG, resolution_px=256, batch_size=1)
@@ -178,7 +181,8 @@ def test_the_price_is_what_the_code_counts(name: str) -> None:
         return found
 
     filtering = replace(REFERENCE.filtering, taken_in=taken_in)
-    setting = Setting(config, lambda config: replace(REFERENCE, filtering=filtering), view=screen.view)
+    made = lambda config: replace(REFERENCE, filtering=filtering)  # noqa: E731
+    setting = Setting(config, made, view=screen.view, random=lambda: noisy)
     policy = POLICIES[name](setting)
     state = policy.start()
     for cycle in range(2):
