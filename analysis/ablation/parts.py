@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from tsar.config import require
-from tsar.filtering.records import DEFAULT
+from tsar.filtering.options import DEFAULT
 from tsar.named import require_known
 
 WHOLE = "all of it"

@@ -5,7 +5,6 @@ Pictures and curves are read back from the pages that the runs wrote.
 
 from __future__ import annotations
 
-import json
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from datetime import datetime
@@ -15,6 +14,7 @@ from typing import Any
 import numpy as np
 
 from analysis.command.console import Table
+from analysis.comparison.finished import named_folders, read_summary
 from analysis.page.comparer import Comparer, Panel, Step, read_comparer
 from analysis.page.curves import Curve, Plot
 from analysis.page.figures import INKS
@@ -59,27 +59,11 @@ def finished_runs(folders: Sequence[Path]) -> list[FinishedRun]:
     Raises:
         ValueError: a folder is given twice, or is not that of a finished run.
     """
-    return [_read(folder, name) for folder, name in zip(folders, _names(folders), strict=True)]
-
-
-def _names(folders: Sequence[Path]) -> list[str]:
-    parts = [folder.resolve().parts for folder in folders]
-    for count in range(1, max(map(len, parts)) + 1):
-        names = ["/".join(one[-count:]) for one in parts]
-        if len(set(names)) == len(names):
-            return names
-    raise ValueError(f"folders: expected a folder once, got {', '.join(map(str, folders))}")
+    return [_read(folder, name) for name, folder in named_folders(folders).items()]
 
 
 def _read(folder: Path, name: str) -> FinishedRun:
-    try:
-        summary = json.loads((folder / SUMMARY).read_text(encoding="utf-8"))
-    except (OSError, ValueError):
-        raise ValueError(f"{folder}: expected the folder of a finished run, found no {SUMMARY} to read") from None
-    known = {"policy": str, "rivals": list, "mse": dict, "reference_time_s": list, "config": dict, "provenance": dict}
-    lacking = [key for key, kind in known.items() if not isinstance(summary.get(key), kind)]
-    if lacking:
-        raise ValueError(f"{folder}: expected the {SUMMARY} of a comparison, found none of {', '.join(lacking)} in it")
+    summary = read_summary(folder)
     made = datetime.fromtimestamp((folder / SUMMARY).stat().st_mtime).strftime("%Y-%m-%d %H:%M")
     try:
         return FinishedRun(name, summary, read_comparer(folder / "report.html"), made=made)

@@ -12,6 +12,11 @@ from analysis.comparison.options import ReportOptions
 def main() -> None:
     """Reads the runs, writes the page, prints the outcome."""
     options = parse(ReportOptions, __doc__ or "")
+    from analysis.comparison.finished import named_folders, read_summary
+
+    with bad_input():  # before slow imports
+        for folder in named_folders(options.folders).values():
+            read_summary(folder)
     from analysis.command.console import show
     from analysis.comparison.days import finished_runs, outcome_table, page_of
     from analysis.page.report import write_report

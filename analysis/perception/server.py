@@ -21,6 +21,7 @@ from tornado.web import HTTPError
 
 from analysis.command.cli import InputError
 from analysis.command.pages import Answering, served
+from analysis.page.environment import environment
 from analysis.perception.protocol import TrialSession
 
 _HERE = Path(__file__).parent
@@ -48,12 +49,14 @@ class _Handler(Answering):
 
 class _Asset(_Handler):
     def get(self, name: str) -> None:
-        name = name or "trial_page.html"
-        self.set_header("Content-Type", "text/javascript" if name.endswith(".js") else "text/html; charset=utf-8")
+        self.set_header("Content-Type", "text/javascript" if name else "text/html; charset=utf-8")
         # the same address may serve another session later
         self.set_header("Cache-Control", "no-store")
         self.set_header("X-Frame-Options", "DENY")
-        self.finish((_HERE / name).read_text(encoding="utf-8").replace("{{token}}", self.service.session.token))
+        if name:
+            self.finish((_HERE / name).read_text(encoding="utf-8"))
+        else:
+            self.finish(environment().get_template("trial.html.j2").render(token=self.service.session.token))
 
 
 class _Guarded(_Handler):

@@ -272,7 +272,7 @@ def require_pace(name: str, price: Price, machine: Machine, span_s: tuple[float,
 
 
 def _changed(setting: Setting, parts: Mapping[str, Any]) -> Policy[Any]:
-    from tsar.filtering.records import DEFAULT
+    from tsar.filtering.options import DEFAULT
     from tsar.policies.filter import Filter
 
     return Filter(setting, dataclasses.replace(DEFAULT, **parts))

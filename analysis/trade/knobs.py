@@ -11,7 +11,7 @@ from typing import Any
 
 from analysis.study.cases import ROWS, Case, Scale
 from tsar.config import TsarConfig, require
-from tsar.filtering.records import DEFAULT
+from tsar.filtering.options import DEFAULT
 from tsar.named import require_known
 from tsar.policies import RIVALS
 
@@ -154,15 +154,15 @@ def alone(knob: Knob) -> list[tuple[Value, KnobSetting]]:
     return [(value, setting_of(knob.policy, {knob.name: value})) for value in (knob.default, *knob.values)]
 
 
-def chosen_knobs(names: Sequence[str]) -> tuple[Knob, ...]:
-    """Knobs by their names; all knobs where no name is given.
+def chosen_knobs(names: Sequence[str], option: str = "knobs") -> tuple[Knob, ...]:
+    """Knobs by their names, which the option has; all knobs where no name is given.
 
     Raises:
         ConfigError: a name is unknown, or given twice.
     """
     for name in names:
-        require_known(name, "knobs", KNOBS)
-    require(len(names) == len(set(names)), "knobs", "none twice", tuple(names))
+        require_known(name, option, KNOBS)
+    require(len(names) == len(set(names)), option, "none twice", tuple(names))
     return tuple(KNOBS[name] for name in names or KNOBS)
 
 

@@ -13,6 +13,7 @@ from analysis.metrics.cost_model import SEGMENTS_DEFAULT, Ledger
 from analysis.metrics.display_model import DisplayModel
 from analysis.study.asked import require_distinct
 from analysis.study.inputs import INPUTS
+from analysis.trade.knobs import chosen_knobs
 from tsar.config import closed_choices
 
 
@@ -66,6 +67,8 @@ class TradeOptions:
 
     def __post_init__(self) -> None:
         require_distinct(self, "inputs")
+        for name in ("knobs", "search_knobs"):
+            chosen_knobs(getattr(self, name), name)
         limits.within(
             self,
             seconds=(0.05, 60.0),

@@ -6,7 +6,7 @@ from typing import Any
 
 import pandas as pd
 
-from analysis.command.cli import bad_input, full_disk
+from analysis.command.cli import full_disk
 from analysis.comparison.front import STORED
 from analysis.page.figures import save
 from analysis.storage.files import write_json, write_table
@@ -35,10 +35,7 @@ def trade(options: TradeOptions) -> tuple[dict[str, Any], Tables]:
     Raises:
         InputError: the machine or the input cannot provide what the options ask for.
     """
-    with bad_input():
-        knobs = chosen_knobs(options.knobs)
-        chosen_knobs(options.search_knobs)
-    measured = measure(options, knobs)
+    measured = measure(options, chosen_knobs(options.knobs))
     measured.outcomes.tell()
     points = point_table(measured.results(), options.ledger)
     front = relative(points, options.draws)

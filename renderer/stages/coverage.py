@@ -9,7 +9,7 @@ from functools import lru_cache
 from typing import Any, Literal
 
 from tsar.config import TsarConfig
-from tsar.filtering.records import FilterOptions
+from tsar.filtering.options import FilterOptions
 from tsar.filtering.stages import FilterStages
 
 StageName = Literal["observe", "respond", "decide", "reconstruct", "account"]

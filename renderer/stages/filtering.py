@@ -17,7 +17,8 @@ from renderer.stages import picture_kernels
 from renderer.stages.poses import pose_words, rows_of
 from renderer.stages.sizes import FRAME, LEVEL_PLANES, PIXEL_WORDS
 from tsar.filtering.batches import Traced
-from tsar.filtering.records import ELEMENT_PX, TILE_SIDE, VARIANCE_MAX, Change, Estimates, FilterOptions, Surfels
+from tsar.filtering.options import FilterOptions
+from tsar.filtering.records import ELEMENT_PX, TILE_SIDE, VARIANCE_MAX, Change, Estimates, Surfels
 from tsar.filtering.stages import FilterStages
 from tsar.filtering.tiles import filled_up, spacings
 from tsar.types import Hits, Viewpoint

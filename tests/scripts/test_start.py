@@ -39,9 +39,18 @@ def test_help_imports_nothing_large(name: str, tmp_path: Path) -> None:
     assert not modules & set(HEAVY)
 
 
-def test_a_bad_option_is_refused_as_early(tmp_path: Path) -> None:
-    status, modules, shown = start(tmp_path, str(ROOT / "scripts" / "run.py"), "fly-by", "--batch-size", "-1")
-    assert status == 2 and "batch_size" in shown
+@pytest.mark.parametrize(
+    ("name", "arguments", "said"),
+    [
+        ("run.py", ("fly-by", "--batch-size", "-1"), "batch_size"),
+        ("report.py", ("gone",), "gone: expected the folder of a finished run"),
+        ("trade.py", ("--knobs", "bach"), "knobs: expected one of policy, batch"),
+        ("trade.py", ("--search-knobs", "bach"), "search_knobs: expected one of policy, batch"),
+    ],
+)
+def test_bad_options_are_refused_as_early(name: str, arguments: tuple[str, ...], said: str, tmp_path: Path) -> None:
+    status, modules, shown = start(tmp_path, str(ROOT / "scripts" / name), *arguments)
+    assert status == 2 and said in shown, shown
     assert not modules & set(HEAVY)
 
 

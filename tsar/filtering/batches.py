@@ -9,7 +9,8 @@ from jaxtyping import Float, Float64
 from torch import Tensor
 
 from tsar.filtering import change, samples, wavelets
-from tsar.filtering.records import Change, Estimates, FilterOptions, Surfels
+from tsar.filtering.options import FilterOptions
+from tsar.filtering.records import Change, Estimates, Surfels
 from tsar.projection import project
 from tsar.roots import encoded
 from tsar.types import Hits, Viewpoint

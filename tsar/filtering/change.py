@@ -8,7 +8,8 @@ import torch.nn.functional as F
 from jaxtyping import Bool, Float, Float64
 from torch import Tensor
 
-from tsar.filtering.records import ELEMENT_PX, VARIANCE_MAX, Change, Estimates, FilterOptions
+from tsar.filtering.options import FilterOptions
+from tsar.filtering.records import ELEMENT_PX, VARIANCE_MAX, Change, Estimates
 from tsar.roots import encoded
 
 TOLERANCE = 4.0  # a squared residual beyond this many variances indicates change

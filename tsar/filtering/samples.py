@@ -9,7 +9,8 @@ import torch.nn.functional as F
 from jaxtyping import Bool, Float, Float64, Int64
 from torch import Tensor
 
-from tsar.filtering.records import TILE_SIDE, VARIANCE_MAX, Estimates, FilterOptions, Surfels
+from tsar.filtering.options import FilterOptions
+from tsar.filtering.records import TILE_SIDE, VARIANCE_MAX, Estimates, Surfels
 from tsar.morton import morton_to_raster, raster_to_morton
 from tsar.projection import project
 from tsar.roots import square_root

@@ -11,7 +11,8 @@ from torch import Tensor
 from tsar.filtering.batches import Traced, taken_in
 from tsar.filtering.display import displayed
 from tsar.filtering.motion import advanced
-from tsar.filtering.records import Change, Estimates, FilterOptions, Surfels
+from tsar.filtering.options import FilterOptions
+from tsar.filtering.records import Change, Estimates, Surfels
 from tsar.filtering.shadows import drifted
 from tsar.filtering.tiles import chosen
 from tsar.types import Hits, Viewpoint

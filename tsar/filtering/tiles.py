@@ -10,16 +10,8 @@ import torch.nn.functional as F
 from jaxtyping import Bool, Float, Float64, Int64, Shaped
 from torch import Tensor
 
-from tsar.filtering.records import (
-    ELEMENT_PX,
-    SPACINGS,
-    TILE_SIDE,
-    UNSEEN,
-    VARIANCE_MAX,
-    FilterOptions,
-    Surfels,
-    by_pixels,
-)
+from tsar.filtering.options import FilterOptions
+from tsar.filtering.records import ELEMENT_PX, SPACINGS, TILE_SIDE, UNSEEN, VARIANCE_MAX, Surfels, by_pixels
 from tsar.morton import morton_to_raster
 
 BISECTIONS = 30

@@ -15,7 +15,8 @@ from jaxtyping import Bool, Float64
 from torch import Tensor
 
 from tsar.filtering import densities
-from tsar.filtering.records import DEFAULT, ELEMENT_PX, TILE_SIDE, FilterOptions
+from tsar.filtering.options import DEFAULT, FilterOptions
+from tsar.filtering.records import ELEMENT_PX, TILE_SIDE
 from tsar.policies.filter import PIXEL_FLOPS as OF_GAINS
 from tsar.policies.filter import Filter, State
 from tsar.policy import Moment, Price, Setting, require_square

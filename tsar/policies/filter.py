@@ -25,15 +25,8 @@ from tsar.clock import StageTimer
 from tsar.error import replace_nonfinite
 from tsar.filtering import noise, samples, shadows, tiles
 from tsar.filtering.batches import Traced
-from tsar.filtering.records import (
-    DEFAULT,
-    ELEMENT_PX,
-    TILE_SIDE,
-    Change,
-    Estimates,
-    FilterOptions,
-    Surfels,
-)
+from tsar.filtering.options import DEFAULT, FilterOptions
+from tsar.filtering.records import ELEMENT_PX, TILE_SIDE, Change, Estimates, Surfels
 from tsar.morton import morton_to_raster
 from tsar.policy import Moment, Picture, Policy, Price, Setting, WhenAsked
 from tsar.prediction import mid_display_s, predicted

@@ -22,7 +22,8 @@ from torch import Tensor
 from tsar.clock import StageTimer
 from tsar.config import TsarConfig
 from tsar.filtering import splats
-from tsar.filtering.records import DEFAULT, ELEMENT_PX, SPACINGS, TILE_SIDE, VARIANCE_MAX, FilterOptions
+from tsar.filtering.options import DEFAULT, FilterOptions
+from tsar.filtering.records import ELEMENT_PX, SPACINGS, TILE_SIDE, VARIANCE_MAX
 from tsar.morton import deinterleave, morton_to_raster
 from tsar.policies.filter import SAMPLE_FLOPS, Filter, State
 from tsar.policy import Moment, Price, Setting, require_square

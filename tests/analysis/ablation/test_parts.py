@@ -12,7 +12,7 @@ from analysis.ablation.runs import rivals_of, runs
 from analysis.study.cases import SCALES
 from analysis.study.inputs import INPUTS
 from tsar.config import ConfigError, TsarConfig
-from tsar.filtering.records import DEFAULT
+from tsar.filtering.options import DEFAULT
 from tsar.policies import RIVALS
 
 OPTIONS = AblationOptions(inputs=("fly-by", "chase"), rows=(6, 7), repetitions=2, rivals=("afr", "framed-half"))

@@ -13,9 +13,12 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from jinja2 import UndefinedError
 
+import analysis
 from analysis.page.comparer import SCRIPTS, Comparer, Panel, Step, read_comparer, source
 from analysis.page.curves import Curve, Plot
+from analysis.page.environment import environment
 from analysis.page.pictures import ColorScale, picture_bytes
 from analysis.page.report import STYLE, Report, Table, flat, render, write_report
 from tests.analysis.builders import png_bytes
@@ -169,3 +172,13 @@ def test_the_file_is_written_whole(tmp_path: Path) -> None:
 def test_flat() -> None:
     nested = {"a": 1, "b": {"c": 2, "d": {"e": (3, 4)}}, "f": {}, "g": None}
     assert flat(nested) == [("a", 1), ("b.c", 2), ("b.d.e", (3, 4)), ("g", None)]
+
+
+def test_every_page_is_a_template_of_one_environment() -> None:
+    """Names that are not given, and text that is not escaped, are faults there."""
+    assert not list(Path(analysis.__file__).parent.rglob("*.html"))
+    assert {"report.html.j2", "live.html.j2", "trial.html.j2"} <= set(environment().list_templates())
+    page = environment().get_template("trial.html.j2")
+    assert EVIL not in page.render(token=EVIL)
+    with pytest.raises(UndefinedError):
+        page.render()

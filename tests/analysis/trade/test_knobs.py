@@ -23,7 +23,7 @@ from analysis.trade.shown import shown_tables
 from analysis.trade.store import front_file
 from analysis.trade.tables import RunResult, knees, knob_table, point_table, relative, sentences
 from tsar.config import ConfigError, TsarConfig
-from tsar.filtering.records import DEFAULT, FilterOptions
+from tsar.filtering.options import DEFAULT, FilterOptions
 
 OPTIONS = TradeOptions(inputs=("chase", "planescene"), repetitions=2)
 HERE = Where("chase", "", 3, 0.25)

@@ -26,7 +26,7 @@ from tsar.config import (
     TsarConfig,
     closed_choices,
 )
-from tsar.filtering.records import DEFAULT, FilterOptions
+from tsar.filtering.options import DEFAULT, FilterOptions
 from tsar.filtering.stages import FilterStages
 from tsar.norms import total_power
 from tsar.policies.thesis import State

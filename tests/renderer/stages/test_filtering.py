@@ -13,7 +13,8 @@ from renderer.stages.control import stages
 from renderer.stages.filtering import filter_stages
 from tests.oracles.screens import Layer, Screen
 from tsar.config import TilingConfig, TsarConfig
-from tsar.filtering.records import DEFAULT, ELEMENT_PX, UNSEEN, VARIANCE_MAX, Estimates, FilterOptions, Surfels, centres
+from tsar.filtering.options import DEFAULT, FilterOptions
+from tsar.filtering.records import ELEMENT_PX, UNSEEN, VARIANCE_MAX, Estimates, Surfels, centres
 from tsar.filtering.stages import FilterStages
 from tsar.policies.filter import Filter
 from tsar.policy import Moment, Setting, step

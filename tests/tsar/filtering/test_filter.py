@@ -13,7 +13,7 @@ from renderer.stages.control import stages
 from tests.oracles.screens import Layer, Screen
 from tsar.clock import StageTimer, fixed_clock
 from tsar.config import TilingConfig, TsarConfig
-from tsar.filtering.records import FilterOptions
+from tsar.filtering.options import FilterOptions
 from tsar.policies import POLICIES
 from tsar.policies.filter import Filter
 from tsar.policy import Moment, Policy, Setting, run, step

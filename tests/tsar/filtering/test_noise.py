@@ -13,7 +13,8 @@ from renderer.stages.control import stages
 from tests.oracles.screens import Layer, Screen
 from tests.tsar.filtering.test_filter import CONFIG, checkers, error, shown
 from tsar.filtering.noise import detailed
-from tsar.filtering.records import Estimates, FilterOptions
+from tsar.filtering.options import FilterOptions
+from tsar.filtering.records import Estimates
 from tsar.policies.filter import Filter
 from tsar.policy import Setting
 from tsar.types import FrameletBatch, SampleBatch

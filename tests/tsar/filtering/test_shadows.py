@@ -13,7 +13,7 @@ from scenes import catalog
 from tsar.clock import fixed_clock
 from tsar.config import TilingConfig, TsarConfig
 from tsar.filtering import shadows
-from tsar.filtering.records import FilterOptions
+from tsar.filtering.options import FilterOptions
 from tsar.policies.filter import Filter
 from tsar.policy import Setting, run
 from tsar.projection import project

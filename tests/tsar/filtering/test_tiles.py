@@ -9,7 +9,7 @@ import torch
 from torch import Tensor
 
 from tsar.filtering import tiles
-from tsar.filtering.records import FilterOptions
+from tsar.filtering.options import FilterOptions
 
 LEVELS = 1, 2, 4
 
