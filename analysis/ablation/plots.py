@@ -13,10 +13,10 @@ from matplotlib.ticker import FuncFormatter
 from analysis.ablation.parts import WHOLE
 from analysis.ablation.tables import ALL, by_input, where
 from analysis.metrics.budget import SHARES
-from analysis.page.figures import ADAPTIVE, FRAMED, GRID, OTHER
+from analysis.page.figures import ADAPTIVE, FRAMED, GRID, INKS, MARKERS, OTHER
 
-_INKS = (FRAMED, OTHER, "#8a56ac", "#b8860b", "#2a9d8f")
-_SHARE_INKS = dict(zip(SHARES, ("#6b6b6b", FRAMED, ADAPTIVE, "#b8860b", OTHER), strict=True))
+_SHARE_INKS = dict(zip(SHARES, ("0.42", FRAMED, ADAPTIVE, INKS[5], OTHER), strict=True))
+_HATCHES = dict(zip(SHARES, ("", "//", "", "..", "xx"), strict=True))
 
 
 def figure(parts: pd.DataFrame, budget: pd.DataFrame, floor: pd.DataFrame, row: int) -> Figure:
@@ -45,7 +45,8 @@ def _changes(axis: Axes, changes: dict[str, dict[str, float]]) -> None:
     axis.axvline(1.0, color="0.2", linewidth=1.0)
     for number, name in enumerate(inputs):
         at = [(values[name], place) for place, values in enumerate(changes.values()) if name in values]
-        axis.plot(*zip(*at, strict=True), "o", color=_INKS[number % len(_INKS)], markersize=5, alpha=0.85, label=name)
+        axis.plot(*zip(*at, strict=True), MARKERS[number % len(MARKERS)], color=INKS[1 + number % 6], markersize=5,
+                  alpha=0.85, label=name)  # fmt: skip
     at = [(values[ALL], place) for place, values in enumerate(changes.values())]
     if at:
         axis.plot(*zip(*at, strict=True), "|", color="0.1", markersize=14, markeredgewidth=2, label="geometric mean")
@@ -64,7 +65,8 @@ def _stacks(axis: Axes, budget: pd.DataFrame, floor: pd.DataFrame) -> None:
     for share in SHARES if names else ():
         values = budget[share].to_numpy()
         start = np.where(values >= 0.0, above, below)  # shares below 0 lie to the left of it
-        axis.barh(range(len(names)), values, left=start, height=0.6, color=_SHARE_INKS[share], label=share)
+        axis.barh(range(len(names)), values, left=start, height=0.6, color=_SHARE_INKS[share], hatch=_HATCHES[share],
+                  edgecolor="w", label=share)  # fmt: skip
         above, below = above + np.maximum(values, 0.0), below + np.minimum(values, 0.0)
     if names:
         values = floor["floor"].to_numpy()

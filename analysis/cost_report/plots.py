@@ -12,7 +12,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
-from analysis.page.figures import ADAPTIVE, FRAMED, label_ends, line_style, save
+from analysis.page.figures import ADAPTIVE, FRAMED, INKS, label_ends, line_style, save
 from analysis.storage.files import atomic
 
 if TYPE_CHECKING:
@@ -117,7 +117,10 @@ def advantage_figure(
     axis.set_xlabel(_AXES["batch_size"])
     axis.set_ylabel("adaptive cycles per framed image")
     axis.set_title("Advantage by ledger; below 1 a cycle costs more than an image", fontsize=10, loc="left")
-    axis.legend(frameon=False, fontsize=8, loc="center left", bbox_to_anchor=(1.0, 0.5))
+    label_ends(axis)
+    if measured:
+        marks = [line for line in axis.lines if line.get_marker() not in ("", "None")]
+        axis.legend(handles=marks, frameon=False, fontsize=8, loc="upper left")
     return figure
 
 
@@ -131,7 +134,7 @@ def refit_figure(fits: Mapping[str, StageFit]) -> Figure:
         axis.plot(line, [1e3 * fit.origin(1e6 * x) for x in line], color=FRAMED, linewidth=1.1, label="through zero")
         if fit.affine is not None:
             shown = [1e3 * fit.affine(1e6 * x) for x in line]
-            axis.plot(line, shown, color=ADAPTIVE, linewidth=1.1, label="with a fixed cost")
+            axis.plot(line, shown, color=ADAPTIVE, linewidth=1.1, label="with a fixed cost", linestyle="--")
         axis.plot(flops, ms, "o", color="0.15", markersize=4, fillstyle="none", label="measured, a setting each")
         axis.set_xlim(0, line[-1])
         axis.set_ylim(0, 1.25 * ms.max())
@@ -158,14 +161,18 @@ def scaling_figure(cells: Sequence[Cell], laws: Mapping[str, PowerLaw], centre: 
     )
     for axis, against, x, shown, stage in panels:
         seconds = {stage: [c.stage_s[stage] for c in shown], "cycle": [c.cycle_s for c in shown]}
-        for (name, values), ink in zip(seconds.items(), (FRAMED, ADAPTIVE), strict=True):
+        for (name, values), ink, dash, mark in zip(
+            seconds.items(), (FRAMED, ADAPTIVE), ("--", "-"), ("s", "o"), strict=True
+        ):
             law = laws[f"{name}_by_{against}"]
             line = np.geomspace(law.low, law.high, 64)
             label = f"{name}: exponent {law.exponent:.2f}, spread {100 * law.spread:.0f} %"
-            axis.plot(x, 1e3 * np.array(values), "o", color=ink, markersize=5)
-            axis.plot(line, 1e3 * law.factor * line**law.exponent, color=ink, linewidth=1.0, label=label)
+            axis.plot(x, 1e3 * np.array(values), mark, color=ink, markersize=5, label="_measured")
+            axis.plot(line, 1e3 * law.factor * line**law.exponent, color=ink, linewidth=1.0, linestyle=dash,
+                      label=label)  # fmt: skip
             straight = 1e3 * np.array([law.linear(value) for value in line])
-            axis.plot(line, np.where(straight > 0, straight, np.nan), color=ink, linewidth=1.0, linestyle=":")
+            axis.plot(line, np.where(straight > 0, straight, np.nan), color=ink, linewidth=1.0, linestyle=":",
+                      label="_straight")  # fmt: skip
         axis.set_yscale("log")
         axis.set_ylabel("ms per cycle")
         axis.yaxis.set_major_formatter("{x:g}")
@@ -191,14 +198,14 @@ def memory_figure(trace: MemoryTrace, growth: Mapping[str, Any]) -> Figure:
     axis.set_ylabel("memory, MiB")
     slope = growth["slope_settled_bytes_per_1000_cycles"] / _MIB
     axis.set_title(f"Resident memory: {slope:+.2f} MiB per 1000 cycles once settled", fontsize=10, loc="left")
-    axis.legend(frameon=False, fontsize=8, loc="lower right")
+    label_ends(axis)
     return figure
 
 
 def surface_picture(
     surface: PolyData, rows: Sequence[tuple[float, float, float]], limits: Sequence[float], path: Path
 ) -> None:
-    """The equal-cost surface with boxes at the admitted combinations (fig. 7.6), rendered off screen to PNG.
+    """The equal-cost surface with boxes at the admitted combinations (fig. 7.6), rendered off screen to PNG and SVG.
 
     Args:
         surface: points in batch size, segments, output side.
@@ -216,13 +223,13 @@ def surface_picture(
     plotter = pyvista.Plotter(off_screen=True, window_size=[1300, 1000], theme=theme)
     if surface.n_points:
         scaled = pyvista.PolyData(np.asarray(surface.points) / top, surface.faces)
-        plotter.add_mesh(scaled, color="#e0a46b", opacity=0.85, smooth_shading=True, specular=0.2)
-        plotter.add_mesh(scaled.extract_feature_edges(), color="#8a4a12", line_width=2)
+        plotter.add_mesh(scaled, color=INKS[6], opacity=0.85, smooth_shading=True, specular=0.2)
+        plotter.add_mesh(scaled.extract_feature_edges(), color=FRAMED, line_width=2)
     for row in rows:
         centre = np.array(row) / top
         if (centre <= 1.0).all():
             box = pyvista.Cube(center=centre, x_length=_BOX, y_length=_BOX, z_length=_BOX)
-            plotter.add_mesh(box, color="#1f4f8f")
+            plotter.add_mesh(box, color=ADAPTIVE)
     plotter.renderer.show_bounds(
         bounds=(0.0, 1.0, 0.0, 1.0, 0.0, 1.0),
         axes_ranges=[float(value) for most in limits for value in (0.0, most)],
@@ -241,4 +248,6 @@ def surface_picture(
     plotter.camera_position = [(-1.35, 2.75, 1.75), (0.52, 0.5, 0.4), (0.0, 0.0, 1.0)]
     with atomic(path) as temporary:
         plotter.screenshot(temporary)
+    with atomic(path.with_suffix(".svg")) as temporary:
+        plotter.save_graphic(temporary)
     plotter.close()

@@ -26,6 +26,8 @@ INKS = ("#d55e00", "#0072b2", "#009e73", "#cc79a7", "#000000", "#e69f00", "#56b4
 """Vermilion is the ink of the run's own policy. Yellow is left out, because it is hard to see on white."""
 DASHES = ("", "7 3", "2 2", "8 3 2 3", "5 2 1 2 1 2", "12 3", "1 3")
 """Dash patterns beside the inks, in points or pixels."""
+MARKERS = ("o", "s", "^", "D", "v", "P", "X")
+"""Marks beside the inks, of points that no line connects."""
 ADAPTIVE, FRAMED, OTHER = INKS[:3]
 GRID = {"color": "0.88", "linewidth": 0.6}
 """Grid lines behind what is plotted."""

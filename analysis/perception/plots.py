@@ -12,10 +12,8 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from analysis.page.figures import line_style
+from analysis.page.figures import FRAMED, INKS, MARKERS, label_ends, line_style
 from analysis.perception.psychometrics import TWO_ALTERNATIVES, Rule, correct_share
-
-_INK = ("#1f6fb4", "#c9570e", "#4d8f2b", "#7a5195", "#a0722a", "0.45")
 
 
 def psychometric_figure(
@@ -36,37 +34,40 @@ def psychometric_figure(
     """
     figure = Figure(figsize=(5.6, 3.9), layout="constrained")
     axis = figure.subplots()
-    for ink, (value, row) in zip(_INK * 3, fitted.items(), strict=False):
-        _curve(axis, trials.loc[trials[column] == value], row, str(value), ink, rule.guess)
-    axis.axhline(rule.threshold, color="#b02a2a", ls="--", lw=0.9)
-    axis.axhline(rule.guess, color="#2a8f4d", ls="--", lw=0.9)
+    for style, (value, row) in enumerate(fitted.items()):
+        _curve(axis, trials.loc[trials[column] == value], row, str(value), style, rule.guess)
+    axis.axhline(rule.threshold, color="0.3", ls="--", lw=0.9)
+    axis.axhline(rule.guess, color="0.3", ls=":", lw=0.9)
     levels = sorted(trials["samples"].unique())
     axis.set(xscale="log", xlabel="samples per pixel", ylabel="share right", ylim=(rule.guess - 0.15, 1.02))
     apart = [levels[0]]
     for level in levels[1:]:
-        if level > 1.25 * apart[-1]:  # labels of nearer levels would overlap
+        if level > 1.65 * apart[-1]:  # labels of nearer levels would overlap
             apart.append(level)
     axis.set_xticks(apart, [f"{int(level)}" for level in apart], minor=False)
     axis.set_xticks([], minor=True)
     axis.set_title(f"{kind} observers, N = {trials['observer'].nunique()}", fontsize=10)
-    axis.legend(fontsize=8)
+    label_ends(axis)
     return figure
 
 
-def _curve(axis: Axes, part: pd.DataFrame, row: Mapping[str, Any], label: str, ink: str, guess: float) -> None:
+def _curve(axis: Axes, part: pd.DataFrame, row: Mapping[str, Any], label: str, style: int, guess: float) -> None:
     """Means over observers with their standard errors, and the fitted function."""
+    ink = INKS[style % len(INKS)]
     shares = part.pivot_table("correct", "observer", "samples")
     levels = np.asarray(shares.columns, np.float64)
     by_level = [column[np.isfinite(column)] for column in shares.to_numpy(np.float64).T]
     errors = [values.std(ddof=1) / np.sqrt(len(values)) if len(values) > 1 else 0.0 for values in by_level]
-    axis.errorbar(levels, [values.mean() for values in by_level], errors, fmt="o", ms=4, color=ink, capsize=2)
+    means = [values.mean() for values in by_level]
+    axis.errorbar(levels, means, errors, fmt=MARKERS[style % len(MARKERS)], ms=4, color=ink, capsize=2,
+                  label="_means")  # fmt: skip
     if np.isfinite(row.get("mu", np.nan)):
         x = np.geomspace(levels[0], levels[-1], 200)
         jnd = f"{row['jnd']:.0f}" if 0.0 < row["jnd"] < np.inf else str(row["status"])
         shares = correct_share(x, row["mu"], row["sigma"], row["lapse"], guess)
-        axis.plot(x, shares, color=ink, label=f"{label}, JND {jnd}")
+        axis.plot(x, shares, **line_style(style), label=f"{label}, JND {jnd}")
     else:
-        axis.plot([], [], color=ink, label=f"{label}, no fit")
+        axis.plot([], [], **line_style(style), label=f"{label}, no fit")
 
 
 def sweep_figure(rows: pd.DataFrame, scenes: Sequence[str]) -> Figure:
@@ -81,7 +82,7 @@ def sweep_figure(rows: pd.DataFrame, scenes: Sequence[str]) -> Figure:
     axis.set_xticks([], minor=True)
     axis.set(xlabel="noise of a stimulus, JOD", ylabel="just noticeable, samples per pixel")
     axis.grid(True, alpha=0.3)
-    axis.legend(fontsize=8)
+    label_ends(axis)
     return figure
 
 
@@ -99,7 +100,7 @@ def densities_figure(filters: Mapping[str, tuple[NDArray[np.float64], NDArray[np
     figure = Figure(figsize=(3.4 * len(filters), 2.4), layout="constrained")
     axes = figure.subplots(1, len(filters), sharey=True)
     for axis, (title, (times, density)) in zip(axes, filters.items(), strict=True):
-        axis.plot(times, density, color=_INK[0])
+        axis.plot(times, density, color=FRAMED)
         axis.set(title=title, xlabel="time, share of the shutter's", xlim=(0, 1), ylim=(0, 2.2))
     axes[0].set_ylabel("density")
     return figure

@@ -15,7 +15,7 @@ from matplotlib.patches import Rectangle
 from matplotlib.ticker import LogLocator
 from PIL import Image
 
-from analysis.page.figures import ADAPTIVE, FRAMED, GRID, OTHER, save
+from analysis.page.figures import ADAPTIVE, GRID, INKS, MARKERS, label_ends, line_style, save
 from analysis.page.pictures import RATE_MAP, number
 
 if TYPE_CHECKING:
@@ -26,7 +26,6 @@ if TYPE_CHECKING:
 Lines = Sequence[Mapping[str, Any]]
 """Lines of the table of settings."""
 
-_INKS = (ADAPTIVE, FRAMED, OTHER, "#8d4fa8", "0.35")
 _FACTORS = (1.1, 1.25, 1.5, 2.0, 4.0)
 """The colours of the maps end at one of these factors above and below the default."""
 _MAP = "RdBu_r"
@@ -201,11 +200,11 @@ def line_figure(lines: Lines) -> Figure | None:
         return None
     figure = Figure(figsize=(0.8 + 3.4 * max(2, len(kinds)), 4.2), layout="constrained")
     axes = figure.subplots(1, len(kinds), squeeze=False, sharey=True)[0]
-    inks = dict(zip(dict.fromkeys(line["input"] for line in lines), _INKS, strict=False))
+    styles = {name: style for style, name in enumerate(dict.fromkeys(line["input"] for line in lines))}
     for axis, kind in zip(axes, kinds, strict=True):
         part, column = [line for line in known if line["sweep"] == kind], kind.replace(" ", "_")
-        for name, ink in inks.items():
-            _line(axis, [line for line in part if line["input"] == name], column, ink, name)
+        for name, style in styles.items():
+            _line(axis, [line for line in part if line["input"] == name], column, style, name)
         axis.axhline(1.0, color="0.0", linewidth=0.9)
         axis.set_yscale("log")
         axis.spines[["top", "right"]].set_visible(False)
@@ -217,19 +216,19 @@ def line_figure(lines: Lines) -> Figure | None:
     axes[0].yaxis.set_major_locator(LogLocator(subs=tuple(range(1, 10))))
     axes[0].yaxis.set_major_formatter("{x:g}")
     axes[0].yaxis.set_minor_formatter("")
-    handles, names = axes[0].get_legend_handles_labels()
-    figure.legend(handles, names, frameon=False, fontsize=8, ncols=len(names), loc="outside upper left")
+    label_ends(axes[-1])
     return figure
 
 
-def _line(axis: Axes, lines: Lines, column: str, ink: str, name: str) -> None:
+def _line(axis: Axes, lines: Lines, column: str, style: int, name: str) -> None:
     at, ratio, least, most = (
         np.array([line[key] for line in lines]) for key in (column, "ratio", "ratio_least", "ratio_most")
     )
     reach = np.maximum([ratio - least, most - ratio], 0.0)
-    axis.errorbar(
-        at, ratio, reach if reach.any() else None, color=ink, marker="o", markersize=3.5, label=name, capsize=2
-    )
+    axis.errorbar(at, ratio, reach if reach.any() else None, marker=MARKERS[style % len(MARKERS)], markersize=3.5,
+                  capsize=2, label=f"_{name}", **line_style(style))  # fmt: skip
+    axis.plot(at, ratio, label=name, **line_style(style))
     marked = [line for line in lines if line["default"]]
     where, height = ([line[key] for line in marked] for key in (column, "ratio"))
-    axis.plot(where, height, "*", color=ink, markeredgecolor="black", markersize=13, zorder=4)
+    axis.plot(where, height, "*", color=INKS[style % len(INKS)], markeredgecolor="black", markersize=13, zorder=4,
+              label="_default")  # fmt: skip

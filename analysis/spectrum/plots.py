@@ -14,13 +14,12 @@ from matplotlib.ticker import FuncFormatter
 from numpy.typing import NDArray
 
 from analysis.metrics.arrays import Floats
-from analysis.page.figures import ADAPTIVE, FRAMED, GRID, OTHER
+from analysis.page.figures import ADAPTIVE, FRAMED, GRID, INKS, MARKERS
 from analysis.spectrum.estimate_check import Example, Tiles
 from analysis.spectrum.ideal_density import share_of_total
 from analysis.spectrum.spectra import Spectrum
 
 _LEVELS = (0.0, 0.2, 0.4, 0.6, 0.8, 0.9, 0.95, 0.98, 0.99, 0.995, 1.0)
-_INKS = (ADAPTIVE, FRAMED, OTHER, "#8d4fa8", "#b8960c", "0.35")
 
 
 def _plain(axis: Axes) -> None:
@@ -33,7 +32,8 @@ def slope_figure(spectra: Sequence[Spectrum]) -> Figure:
     """Slopes by group, one dot per spectrum (fig. 1.3)."""
     groups = list(dict.fromkeys(spectrum.group for spectrum in spectra))
     sources = list(dict.fromkeys(s.source for s in spectra if s.group.startswith(("frames", "framelets"))))
-    ink = {source: _INKS[i % len(_INKS)] for i, source in enumerate(sources)}
+    ink = {source: INKS[i % len(INKS)] for i, source in enumerate(sources)}
+    mark = {source: MARKERS[i % len(MARKERS)] for i, source in enumerate(sources)}
     figure = Figure(figsize=(8.5, 1.5 + 0.42 * len(groups)), layout="constrained")
     axis = figure.subplots()
     _plain(axis)
@@ -43,11 +43,12 @@ def slope_figure(spectra: Sequence[Spectrum]) -> Figure:
         lanes = np.linspace(-0.26, 0.26, len(members)) if len(members) > 1 else [0.0]
         for lane, member in zip(lanes, members, strict=True):
             known = ink.get(member.source, "0.1")
-            axis.plot(member.slope, row + lane, "o", color=known, markersize=4.5, markeredgewidth=0)
+            shape = mark.get(member.source, "o")
+            axis.plot(member.slope, row + lane, shape, color=known, markersize=4.5, markeredgewidth=0)
         slopes = [member.slope for member in members]
         axis.plot([np.mean(slopes)] * 2, [row - 0.36, row + 0.36], color="0.2", linewidth=1.6)
     for source in sources:
-        axis.plot([], [], "o", color=ink[source], markersize=4.5, label=source.replace("$", r"\$"))
+        axis.plot([], [], mark[source], color=ink[source], markersize=4.5, label=source.replace("$", r"\$"))
     axis.plot([], [], color="0.2", linewidth=1.6, label="mean of the group")
     axis.set_yticks(range(len(groups)), groups)
     axis.set_ylim(len(groups) - 0.4, -0.6)
@@ -126,7 +127,7 @@ def norm_figure(example: Example) -> Figure:
     norm = share_of_total(example.tiles.norm)[0].numpy()
     frequency = np.arange(1, norm.shape[1] + 1)
     right.loglog(frequency, norm[0], color=FRAMED, label="up to one cycle per span (this slice)")
-    right.loglog(frequency, norm[-1], color=ADAPTIVE, label="all temporal frequencies")
+    right.loglog(frequency, norm[-1], color=ADAPTIVE, linestyle="--", label="all temporal frequencies")
     right.axvline(f_s, color="0.2", linewidth=0.9, linestyle=":", label="$f_s$")
     right.set_xlabel("band width s, cycles per tile")
     right.set_ylabel("power norm, share of the total")
@@ -183,8 +184,8 @@ def estimate_figure(example: Example) -> Figure:
     _contour(figure, axis, example)
     at = np.log2(example.tiles.theta.numpy() * example.unit)
     phi = example.tiles.phi[0].numpy()
-    axis.quiver(*at.T, *phi.T, angles="xy", scale_units="xy", scale=1.4, color="#d01c1c", width=0.005, zorder=4)
-    axis.plot(*at.T, "o", color="#d01c1c", markersize=3.5, zorder=4)
+    axis.quiver(*at.T, *phi.T, angles="xy", scale_units="xy", scale=1.4, color=ADAPTIVE, width=0.005, zorder=4)
+    axis.plot(*at.T, "o", color=ADAPTIVE, markersize=3.5, zorder=4)
     (x0, x1), (y0, y1) = np.log2(example.realizable)
     axis.add_patch(Rectangle((x0, y0), x1 - x0, y1 - y0, fill=False, color="w", linewidth=3.0))
     axis.add_patch(Rectangle((x0, y0), x1 - x0, y1 - y0, fill=False, color="k", linewidth=1.4, linestyle="--"))
@@ -219,9 +220,9 @@ def agreement_figure(tiles: Mapping[str, Tiles], found: Mapping[str, Any], tau: 
     axes[0].set_xlabel("angle between φ and the direction to Θ*, degrees")
     axes[0].legend(frameon=False, fontsize=7, loc="lower left", bbox_to_anchor=(-0.3, 1.0))
     for axis, component, name in zip(axes[1:], (0, 1), ("space", "time"), strict=True):
-        for ink, (source, t) in zip(_INKS, tiles.items(), strict=False):
+        for ink, mark, (source, t) in zip(INKS, MARKERS, tiles.items(), strict=False):
             x, y = true[source][..., component].ravel(), t.phi[..., component].numpy().ravel()
-            axis.plot(x, y, ".", color=ink, markersize=3, alpha=0.45, markeredgewidth=0, label=source)
+            axis.plot(x, y, mark, color=ink, markersize=2.4, alpha=0.45, markeredgewidth=0, label=source)
         axis.axhline(0.0, color="0.2", linewidth=0.8)
         axis.axvline(0.0, color="0.2", linewidth=0.8)
         axis.set_ylim(-1.05, 1.05)

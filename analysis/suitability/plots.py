@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import LogLocator
 
 from analysis.metrics.quality import WHISKERS, percentile
-from analysis.page.figures import ADAPTIVE, FRAMED, GRID, save
+from analysis.page.figures import ADAPTIVE, FRAMED, GRID, INKS, dashed, label_ends, save
 from analysis.study.cases import ROWS, Case
 from analysis.study.evaluation import Resources
 from analysis.study.inputs import INPUTS
@@ -19,7 +19,8 @@ from analysis.suitability.options import SuitabilityOptions
 from analysis.suitability.stills import finest, setting, write_strip
 from analysis.suitability.tables import Results, RunResult, ratios
 
-_INK = {256: "#e8a33d", 512: "#c9570c", 1024: "#6d2077"}
+_INK = {256: INKS[6], 512: FRAMED, 1024: ADAPTIVE}
+_HATCH = {256: "", 512: "//", 1024: ".."}
 
 
 def write_all(
@@ -151,7 +152,7 @@ def boxes(results: Results, names: Sequence[str], title: str) -> Figure | None:
             shown, positions=list(values), widths=0.7, patch_artist=True, flierprops=flier, whis=WHISKERS
         )
         for row, box in zip(values, made["boxes"], strict=True):
-            box.set(facecolor=_INK[ROWS[row][1]], alpha=0.75, linewidth=0.7)
+            box.set(facecolor=_INK[ROWS[row][1]], hatch=_HATCH[ROWS[row][1]], alpha=0.75, linewidth=0.7)
         for median in made["medians"]:
             median.set(color="black")
         axis.axhline(1.0, color="0.0", linewidth=0.9)
@@ -167,17 +168,17 @@ def boxes(results: Results, names: Sequence[str], title: str) -> Figure | None:
     axes[0].yaxis.set_minor_formatter("")
     divisor = results.all[0].run.case.scale.divisor
     here = {side: f"{side // divisor}²" + (f" (thesis: {side}²)" if divisor > 1 else "") for side in _INK}
-    handles = [_patch(color, here[side]) for side, color in _INK.items()]
+    handles = [_patch(color, _HATCH[side], here[side]) for side, color in _INK.items()]
     figure.legend(handles=handles, loc="outside lower center", ncols=3, fontsize=8, frameon=False)
     note = f"; {unbounded} infinite ratios not drawn" if unbounded else ""
     figure.suptitle(f"{title}: below 1 thesis is better{note}", fontsize=10, x=0.01, ha="left")
     return figure
 
 
-def _patch(color: str, label: str) -> Any:
+def _patch(color: str, hatch: str, label: str) -> Any:
     from matplotlib.patches import Patch
 
-    return Patch(facecolor=color, alpha=0.75, label=label)
+    return Patch(facecolor=color, hatch=hatch, alpha=0.75, label=label)
 
 
 def errors(results: Results, name: str) -> Figure | None:
@@ -193,7 +194,8 @@ def errors(results: Results, name: str) -> Figure | None:
         ours.sort(key=lambda one: ROWS[one.run.row or 0][0])
         for place, one in enumerate(ours):
             ink, label = _shade(place, len(ours)), setting(one.run)
-            axis.plot(one.times["time_s"], _positive(one.times["mse"]), color=ink, linewidth=0.9, label=label)
+            axis.plot(one.times["time_s"], _positive(one.times["mse"]), color=ink, linewidth=0.9, label=label,
+                      linestyle=dashed(place, 0.9))  # fmt: skip
         for one in found:
             if one.run.side_px == side and one.run.label == "framed":
                 _refreshes(axis, one)
@@ -201,7 +203,7 @@ def errors(results: Results, name: str) -> Figure | None:
         axis.set_yscale("log")
         axis.set_title(f"{name}, {side}²", loc="left", fontsize=10)
         axis.set_xlabel("simulated time, s")
-        axis.legend(fontsize=6, frameon=False)
+        label_ends(axis)
     axes[0].set_ylabel("mean squared error")
     return figure
 
@@ -224,10 +226,10 @@ def ratio_over_time(results: Results, row: int) -> Figure | None:
     figure, (axis,) = _axes(8.0, 3.4)
     _refreshes(axis, framed)
     shown = np.where(np.isfinite(values) & (values > 0), values, np.nan)
-    axis.plot(framed.times["time_s"], shown, color=ADAPTIVE)
+    axis.plot(framed.times["time_s"], shown, color=ADAPTIVE, label="thesis / framed")
     axis.axhline(middle, color="0.2", linestyle=":", linewidth=1.0, label="median")
     for one in (low, high):
-        axis.axhline(one, color="0.2", linestyle="--", linewidth=0.9, label="quartiles" if one == low else None)
+        axis.axhline(one, color="0.2", linestyle="--", linewidth=0.9, label="quartiles" if one == low else "_")
     axis.axhline(high + 1.5 * (high - low), color="0.2", linewidth=0.9, label="outliers above")
     axis.axhline(1.0, color=FRAMED, linewidth=0.9, label="equal error")
     axis.set_yscale("log")
@@ -241,5 +243,5 @@ def ratio_over_time(results: Results, row: int) -> Figure | None:
         loc="left",
         fontsize=10,
     )
-    axis.legend(fontsize=7, frameon=False, ncols=2)
+    label_ends(axis)
     return figure

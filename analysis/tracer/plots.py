@@ -13,9 +13,10 @@ import pandas as pd
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from analysis.page.figures import ADAPTIVE, FRAMED, OTHER, line_style
+from analysis.page.figures import ADAPTIVE, FRAMED, OTHER, label_ends, line_style
 
 _STRUCTURE_INK = {"brute": OTHER, "kdtree": FRAMED, "bvh": ADAPTIVE}
+_MARK = dict(zip(_STRUCTURE_INK, ("s", "^", "o"), strict=True))
 _LABEL = {"brute": "brute force", "kdtree": "kd-tree", "bvh": "tree of boxes"}
 
 
@@ -30,12 +31,12 @@ def tests_figure(rows: pd.DataFrame) -> Figure:
             part = rows[(rows["structure"] == name) & (rows["rays"] == kind)]
             if np.asarray(part[column]).max(initial=0.0) > 0.0:
                 style = "-" if kind == "camera" else "--"
-                axis.loglog(part["triangles"], part[column], style, marker="o", ms=3.5, color=_STRUCTURE_INK[name],
-                            label=f"{_LABEL[name]}, {kind} rays")  # fmt: skip
+                axis.loglog(part["triangles"], part[column], style, marker=_MARK[name], ms=3.5,
+                            color=_STRUCTURE_INK[name], label=f"{_LABEL[name]}, {kind} rays")  # fmt: skip
         axis.set_xlabel("triangles")
         axis.set_ylabel(f"{label} per ray")
         axis.grid(True, which="major", alpha=0.3)
-        axis.legend(fontsize=7)
+        label_ends(axis)
     return figure
 
 
@@ -94,5 +95,6 @@ def convergence_figure(errors: pd.DataFrame, sets: Sequence[str], kinds: Sequenc
             axis.loglog(part["points"], np.maximum(part["mse"], 1e-12), ".", label=name, **line_style(style))
         axis.set(title=kind, xlabel="samples", ylabel="mean squared error")
         axis.grid(True, alpha=0.3)
-    figure.axes[0].legend(fontsize=7)
+    for axis in figure.axes:
+        label_ends(axis)
     return figure

@@ -49,11 +49,13 @@ def front(found: Relative, points: pd.DataFrame) -> Figure:
     table, bands = found.front, found.bands
     assert bands is not None
     inks = [FRAMED if name in of_policies else ADAPTIVE if name in of_search else OTHER for name in table["setting"]]
-    for ink, label in ((OTHER, "a knob of tsar alone"), (ADAPTIVE, "the search"), (FRAMED, "another policy")):
+    for ink, mark, label in (
+        (OTHER, "^", "a knob of tsar alone"), (ADAPTIVE, "o", "the search"), (FRAMED, "s", "another policy")
+    ):  # fmt: skip
         kept = [ink == one for one in inks]
         if any(kept):
             axis.plot(
-                table["cost"][kept], table["error"][kept], "o", color=ink, markersize=4.5, alpha=0.75, label=label
+                table["cost"][kept], table["error"][kept], mark, color=ink, markersize=4.5, alpha=0.75, label=label
             )
     seen = np.isfinite(bands.high)
     axis.fill_between(bands.budgets[seen], bands.low[seen], bands.high[seen], color=ADAPTIVE, alpha=0.15, linewidth=0,

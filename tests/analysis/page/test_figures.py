@@ -1,0 +1,102 @@
+"""Figures of all commands: vector beside raster, the inks of Okabe and Ito, and marks that differ in grey, too."""
+
+from __future__ import annotations
+
+import ast
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+from matplotlib.figure import Figure
+from PIL import Image, ImageColor
+
+from analysis.page.figures import DASHES, INKS, MARKERS, label_ends, line_style, new_figure, save
+
+ROOT = Path(__file__).resolve().parents[3] / "analysis"
+SHARED = "page/figures.py"
+RASTER_ONLY = {
+    SHARED: "save writes both",
+    "comparison/results.py": "the bytes of a picture within a page",
+    "tracer/gallery.py": "a sheet of pictures",
+}
+"""Files that write a figure by matplotlib itself, and why."""
+LINES = {"plot", "step", "semilogx", "semilogy", "loglog", "errorbar", "fill_between", "axhline", "axvline", "bar"}
+
+
+def modules() -> Iterator[tuple[str, ast.Module]]:
+    """Every module that draws by matplotlib or pyvista."""
+    for file in sorted(ROOT.rglob("*.py")):
+        text = file.read_text(encoding="utf-8")
+        if "matplotlib" in text or "pyvista" in text:
+            yield file.relative_to(ROOT).as_posix(), ast.parse(text)
+
+
+def calls(tree: ast.AST) -> Iterator[tuple[str, ast.Call]]:
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Call) and isinstance(node.func, ast.Attribute):
+            yield node.func.attr, node
+
+
+def test_every_figure_is_written_as_vector_too() -> None:
+    """By :func:`save`, but for those that are named above; pictures of pyvista by its own way."""
+    found = {name for name, tree in modules() if any(called == "savefig" for called, _ in calls(tree))}
+    assert found == set(RASTER_ONLY)
+    drawn = 0
+    for name, tree in modules():
+        for part in ast.walk(tree):
+            if isinstance(part, ast.FunctionDef):
+                called = {one for one, _ in calls(part)}
+                drawn += "screenshot" in called
+                assert ("screenshot" in called) == ("save_graphic" in called), f"{name}: {part.name}"
+    assert drawn == 1
+
+
+def test_inks_are_of_one_place() -> None:
+    found = []
+    for name, tree in modules():
+        for node in ast.walk(tree):
+            if isinstance(node, ast.Constant) and isinstance(node.value, str) and node.value.startswith("#"):
+                found += [f"{name}:{node.lineno}"] * (len(node.value) == 7 and name != SHARED)
+    assert not found
+
+
+def test_no_line_has_the_ink_of_a_cycle() -> None:
+    found = []
+    for name, tree in modules():
+        for called, node in calls(tree):
+            named = {one.arg for one in node.keywords}
+            letters = [one.value for one in node.args if isinstance(one, ast.Constant) and isinstance(one.value, str)]
+            known = named & {"color", "facecolor", "markeredgecolor", None} or any("k" in one for one in letters)
+            found += [f"{name}:{node.lineno} {ast.unparse(node)[:60]}"] * (called in LINES and not known)
+    assert not found
+
+
+def test_inks_dashes_and_marks_differ_in_grey() -> None:
+    """Neighbouring lines differ in dashes, and points in marks, whatever grey their inks become."""
+    assert len(set(INKS)) == len(set(DASHES)) == len(set(MARKERS)) == len(INKS)
+    assert all(max(ImageColor.getrgb(ink)) - min(ImageColor.getrgb(ink)) > 60 for ink in INKS if ink != "#000000")
+
+
+@pytest.fixture
+def figure() -> Figure:
+    drawn, (axis,) = new_figure(4.0, 3.0)
+    for style, name in enumerate(("one", "two", "three")):
+        axis.plot([0.0, 1.0], [style, 2.0], label=name, **line_style(style))
+    label_ends(axis)
+    return drawn
+
+
+def test_a_figure_is_saved_twice_with_the_same_bytes(figure: Figure, tmp_path: Path) -> None:
+    save(figure, tmp_path / "a" / "f.png")
+    save(figure, tmp_path / "b" / "f.png")
+    for ending in ("png", "svg"):
+        first, second = ((tmp_path / name / f"f.{ending}").read_bytes() for name in "ab")
+        assert first == second and len(first) > 1000
+    text = (tmp_path / "a" / "f.svg").read_bytes()
+    assert b"<svg" in text and b"\r" not in text and b"<image" not in text
+    with Image.open(tmp_path / "a" / "f.png") as picture:
+        assert picture.size == (520, 390)
+
+
+def test_every_line_has_its_label(figure: Figure) -> None:
+    assert {text.get_text() for text in figure.axes[0].texts} == {"one", "two", "three"}
