@@ -30,8 +30,7 @@ _KINDS = {
 }  # fmt: skip
 """Planes of estimates and surfels in the order of the native records: their number and element type."""
 
-_APART = 320
-"""Padding between planes, bytes, which avoids cache conflicts of addresses that differ by whole pages."""
+_APART = 320  # bytes between planes, which avoids cache conflicts of addresses that differ by whole pages
 
 
 def filter_stages(side: int, threads: int = 1, picture: tuple[int, int] | None = None) -> FilterStages:
