@@ -235,17 +235,20 @@ def _parts(found: Specimens, picture: RenderedImage, number: int) -> list[NDArra
     return [cell[inside & (x * across > 0.0) & (y * down > 0.0)].mean(axis=0) for y in (-1, 1) for x in (-1, 1)]
 
 
-def worst(rows: list[dict[str, Any]]) -> list[dict[str, Any]]:
-    """For each specimen, its worst pair of formats without and with a loss that is reported; the worst come first."""
+def worst(rows: list[dict[str, Any]], pairs: bool = False) -> list[dict[str, Any]]:
+    """For each specimen, its worst pair of formats without and with a loss that is reported; or for each pair of
+    formats, its worst specimen. The worst come first."""
+    rows = [{**row, "pair": f"{row['from']} to {row['to']}"} for row in rows]
+    own, other = ("pair", "specimen") if pairs else ("specimen", "pair")
     made = []
-    for specimen in dict.fromkeys(row["specimen"] for row in rows):
-        found = [row for row in rows if row["specimen"] == specimen and row["off"] == row["off"]]
-        line: dict[str, Any] = {"specimen": specimen, "pairs": len(found)}
+    for name in dict.fromkeys(row[own] for row in rows):
+        found = [row for row in rows if row[own] == name and row["off"] == row["off"]]
+        line: dict[str, Any] = {own: name, f"{other}s": len(found)}
         for title, reported in (("silent", False), ("reported", True)):
             part = [row for row in found if bool(row["losses"]) == reported]
             top = max(part, key=lambda row: row["off"], default=None)
             line[f"{title} beyond {BOUND:.0%}"] = sum(row["off"] > BOUND for row in part)
             line[f"worst {title}"] = float("nan") if top is None else top["off"]
-            line[f"pair, {title}"] = "" if top is None else f"{top['from']} to {top['to']}"
+            line[f"{other}, {title}"] = "" if top is None else top[other]
         made.append(line)
     return sorted(made, key=lambda line: -np.nan_to_num(line["worst silent"]))

@@ -80,8 +80,8 @@ class CheckOptions:
     limit_s: float = 240.0
     """Most seconds for each picture."""
     out: Path = Path("out/conversion-check")
-    """Folder for the results; the scenes, pictures, table.csv, markers.csv, matrix.csv, worst.csv, mutations.csv,
-    pictures.jpg and summary.json."""
+    """Folder for the results; the scenes, pictures, table.csv, markers.csv, matrix.csv, worst.csv, pairs.csv,
+    mutations.csv, pictures.jpg and summary.json."""
 
     def __post_init__(self) -> None:
         limits.within(self, width_px=(16, 4096), samples=(1, 1 << 16), limit_s=(1e-3, 86400.0), mutations=(0, 1 << 24),

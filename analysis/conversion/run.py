@@ -54,7 +54,7 @@ def check(options: CheckOptions) -> list[Table]:
     groups = options.groups or tuple(GROUPS)
     with bad_input():
         require(set(groups) <= set(GROUPS), "groups", f"some of {', '.join(GROUPS)}", " ".join(groups))
-        written = ("table.csv", "markers.csv", "pictures.jpg", "worst.csv", "matrix.csv", "markers/*",
+        written = ("table.csv", "markers.csv", "pictures.jpg", "worst.csv", "pairs.csv", "matrix.csv", "markers/*",
                     "matrix/*", "[0-9][0-9]-*/*", "mutations.csv", "mutations.journal")  # fmt: skip
         own_results(options.out, written)
     with bad_input(), bars() as shown:
@@ -65,8 +65,8 @@ def check(options: CheckOptions) -> list[Table]:
         if options.matrix:
             given, task = (options.samples, options.limit_s), shown.task("matrix", len(groups))
             matrix = matrix_rows(options.out / "matrix", *given, task, groups, options.formats or tuple(FORMATS_OF))
-        tables = {"table": rows, "markers": markers, "matrix": matrix, "worst": worst(matrix) if matrix else [],
-                  "mutations": mutations}  # fmt: skip
+        tables = {"table": rows, "markers": markers, "matrix": matrix, "worst": worst(matrix),
+                  "pairs": worst(matrix, pairs=True), "mutations": mutations}  # fmt: skip
         found = {name: part for name, part in tables.items() if part}
         for name, part in found.items():
             write_table(options.out / f"{name}.csv", pd.DataFrame(part))
@@ -74,8 +74,9 @@ def check(options: CheckOptions) -> list[Table]:
                       options, seed=options.seed)  # fmt: skip
     brief = [{**row, "losses": len(row["losses"])} for row in rows]
     counts = [summed(mutations)] if mutations else []
+    shown = brief, markers, tables["worst"], tables["pairs"]
     faults = [{"fault": fault} for row in mutations for fault in row["faults"]]
-    return [frame_table(pd.DataFrame(part)) for part in (brief, markers, tables["worst"], counts, faults) if part]
+    return [frame_table(pd.DataFrame(part)) for part in (*shown, counts, faults) if part]
 
 
 def mutation_rows(options: CheckOptions, task: Task) -> list[dict[str, Any]]:

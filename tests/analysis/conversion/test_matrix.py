@@ -142,6 +142,10 @@ def test_the_worst_pair_of_a_specimen_is_named() -> None:
     (found,) = worst(rows)
     assert found["worst silent"] == 0.1 and found["pair, silent"] == "pbrt to mitsuba3" and found["pairs"] == 2
     assert found["worst reported"] == 0.5 and found[f"silent beyond {BOUND:.0%}"] == 1
+    first, second = worst([*rows, {**row, "specimen": "b", "off": 0.3}], pairs=True)
+    assert (first["pair"], first["specimen, silent"], first["worst silent"], first["specimens"]) == (
+        "pbrt to mitsuba3", "b", 0.3, 2)  # fmt: skip
+    assert (second["pair"], second["specimen, reported"]) == ("pbrt to pbrt", "a")
 
 
 @pytest.mark.slow
