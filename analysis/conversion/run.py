@@ -74,9 +74,9 @@ def check(options: CheckOptions) -> list[Table]:
                       options, seed=options.seed)  # fmt: skip
     brief = [{**row, "losses": len(row["losses"])} for row in rows]
     counts = [summed(mutations)] if mutations else []
-    shown = brief, markers, tables["worst"], tables["pairs"]
+    listed = brief, markers, tables["worst"], tables["pairs"]
     faults = [{"fault": fault} for row in mutations for fault in row["faults"]]
-    return [frame_table(pd.DataFrame(part)) for part in (*shown, counts, faults) if part]
+    return [frame_table(pd.DataFrame(part)) for part in (*listed, counts, faults) if part]
 
 
 def mutation_rows(options: CheckOptions, task: Task) -> list[dict[str, Any]]:
