@@ -41,6 +41,11 @@ from scenes.models.usd_views import LAMP, camera_of, glow_of, light_of
 
 _GREY = 0.18
 _ADDRESS = re.compile(r"anon:0x[0-9a-fA-F]+:?")
+_NESTED = re.compile(
+    rb'"""(?s:.*?)"""|"(?:\\.|[^"\\\n])*"|\'(?:\\.|[^\'\\\n])*\'|#[^\n]*|@[^@\n]*@|[=:]\s*\[[\s\d.,()eE+-]*(\[)'
+)
+"""Strings, comments and files of USD text, and numbers in which a further list begins."""
+
 _RULE = re.compile(r" matching pxrInternal.*?(?= at ')")  # of OpenUSD's grammar
 _SAID_MOST = 200  # characters of a message, which may quote the rest of the file
 _Part = tuple[Any, Material, Matrix]
@@ -54,6 +59,7 @@ def read_usd(sources: Sources, report: LossReport, facets: bool = False) -> Mode
     Raises:
         SceneError: the file cannot be read.
     """
+    _refuse_nested(sources)
     quiet = UsdUtils.CoalescingDiagnosticDelegate()  # its messages would go to standard error
     try:
         stage = Usd.Stage.Open(str(sources.path))
@@ -70,6 +76,20 @@ def read_usd(sources: Sources, report: LossReport, facets: bool = False) -> Mode
     finally:
         quiet.TakeCoalescedDiagnostics()
         del quiet
+
+
+def _refuse_nested(sources: Sources) -> None:
+    """Refuses lists within lists of numbers, after which the library quotes the rest of the file at each number.
+
+    Raises:
+        SceneError: there is one.
+    """
+    content = sources.path.read_bytes()
+    found = _NESTED.finditer(content) if content.startswith(b"#usda") else iter(())
+    at = next((one.start(1) for one in found if one[1]), None)
+    if at is not None:
+        line, column = content.count(b"\n", 0, at) + 1, at - content.rfind(b"\n", 0, at)
+        raise SceneError(f"cannot be read: {line}:{column}: expected numbers, got a list within a list")
 
 
 class _Reader:

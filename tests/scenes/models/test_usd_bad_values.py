@@ -45,6 +45,15 @@ def test_messages_of_the_library_do_not_quote_the_file(wrong: str, tmp_path: Pat
     assert len(said) < 300 + len(str(tmp_path)) and "pxr" not in said and "\n" not in said, said
 
 
+def test_lists_within_lists_are_refused_before_the_library_quotes_the_file_at_each_number(tmp_path: Path) -> None:
+    """1 GB for a file of 0.6 MB."""
+    for inside in ("1, [", "[", "(0, 1), 2e-3, ["):
+        with pytest.raises(SceneError, match="10:.*: expected numbers, got a list within a list"):
+            read_whole(written(tmp_path, f'def Mesh "m" {{\n int[] a = [{inside} 0, 1]\n}}'))
+    quoted = 'string doc = "= [1, [" # = [[\n string more = """= [1,\n [" """\n'
+    read_whole(written(tmp_path, mesh(quoted)))
+
+
 def test_lights_without_an_angle_or_extent(tmp_path: Path) -> None:
     body = """def DistantLight "sun" { float inputs:angle = -1 }
     def RectLight "panel" { bool inputs:normalize = 1
