@@ -13,6 +13,7 @@ Conventions:
 """
 
 from scenes.canonical.cameras import Camera, EnvironmentCamera, OrthographicCamera, PerspectiveCamera, RealisticCamera
+from scenes.canonical.curves import Curves
 from scenes.canonical.facets import Glossy, Metal, MetallicRough, Plastic
 from scenes.canonical.lights import DirectionalLight, EnvironmentLight, Light, PointLight, SpotLight, SunSky
 from scenes.canonical.materials import (
@@ -44,10 +45,10 @@ from scenes.canonical.textures import (
 from scenes.canonical.values import Matrix, Rgb, RigidTrack, SceneError, identity
 
 __all__ = [
-    "Bumped", "Camera", "CheckerboardTexture", "ConstantTexture", "Cube", "DirectionalLight", "Disk", "Emissive",
-    "EnvironmentCamera", "EnvironmentLight", "Film", "Glass", "Glossy", "HeightField", "ImageTexture", "Instance",
-    "Integrator", "Light", "Masked", "Material", "Matrix", "Matte", "Medium", "Mesh", "Metal", "MetallicRough",
-    "Mirror", "MixMaterial", "MixTexture", "NormalMapped", "OrthographicCamera", "PerspectiveCamera", "Phong",
-    "Plastic", "PointLight", "RealisticCamera", "Rectangle", "Rgb", "RigidTrack", "Sampler", "ScaleTexture", "Scene",
-    "SceneError", "Shape", "Sphere", "SpotLight", "SunSky", "Texture", "Translucent", "Uber", "identity",
+    "Bumped", "Camera", "CheckerboardTexture", "ConstantTexture", "Cube", "Curves", "DirectionalLight", "Disk",
+    "Emissive", "EnvironmentCamera", "EnvironmentLight", "Film", "Glass", "Glossy", "HeightField", "ImageTexture",
+    "Instance", "Integrator", "Light", "Masked", "Material", "Matrix", "Matte", "Medium", "Mesh", "Metal",
+    "MetallicRough", "Mirror", "MixMaterial", "MixTexture", "NormalMapped", "OrthographicCamera", "PerspectiveCamera",
+    "Phong", "Plastic", "PointLight", "RealisticCamera", "Rectangle", "Rgb", "RigidTrack", "Sampler", "ScaleTexture",
+    "Scene", "SceneError", "Shape", "Sphere", "SpotLight", "SunSky", "Texture", "Translucent", "Uber", "identity",
 ]  # fmt: skip

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scenes.arithmetic import determinant
+from scenes.canonical.curves import Curves
 from scenes.canonical.materials import Material
 from scenes.canonical.media import Medium
 from scenes.canonical.values import Matrix, Rgb, RigidTrack, SceneError, identity
@@ -72,7 +73,7 @@ class Cube:
     """The cube ``[-1, 1]³`` in object space."""
 
 
-Shape = Mesh | Sphere | Disk | Rectangle | Cube
+Shape = Mesh | Sphere | Disk | Rectangle | Cube | Curves
 
 
 @dataclass(frozen=True, eq=False)

@@ -19,6 +19,7 @@ from scenes.canonical import (
     CheckerboardTexture,
     ConstantTexture,
     Cube,
+    Curves,
     Disk,
     Emissive,
     EnvironmentCamera,
@@ -57,7 +58,7 @@ from scenes.formats.appearance.media import without_media
 from scenes.formats.appearance.simpler import simpler
 from scenes.formats.appearance.spectra import rgb
 from scenes.formats.appearance.spot_profiles import reshaped
-from scenes.formats.geometry.meshed import as_mesh, depends_on_uv
+from scenes.formats.geometry.meshed import as_mesh, cube_sides, depends_on_uv
 from scenes.formats.geometry.placing import lose_back, lose_shine_behind
 from scenes.formats.losses import LossReport
 from scenes.models.phong_of_parts import EXPONENT_MAX
@@ -131,6 +132,10 @@ class Approximation:
         if instance.emission is not None and isinstance(instance.shape, Rectangle | Disk):
             lose_shine_behind(named, self.report)
         made = dataclasses.replace(instance, material=self.material(instance.material, name), name=name)
+        if isinstance(instance.shape, Curves):
+            mesh = as_mesh(instance.shape)
+            self.report.add(name, "curves", f"a mesh of {len(mesh.faces)} triangles")
+            made = dataclasses.replace(made, shape=mesh)
         if instance.emission is None:
             if isinstance(instance.shape, Cube | Disk) and depends_on_uv(made.material):
                 return [dataclasses.replace(made, shape=as_mesh(instance.shape))]
@@ -138,7 +143,7 @@ class Approximation:
         if isinstance(instance.shape, Rectangle | Sphere):
             return [made]
         if isinstance(instance.shape, Cube):
-            places = [product(instance.to_world, side) for side in _sides()]
+            places = [product(instance.to_world, side) for side in cube_sides()]
             return [dataclasses.replace(made, shape=Rectangle(), to_world=place) for place in places]
         if isinstance(instance.shape, Disk):
             side = math.sqrt(math.pi) / 2.0 * instance.shape.radius
@@ -270,18 +275,6 @@ class Approximation:
             1.0 if mirrored else 0.0,
             mirror_spread_deg=spread_deg(alpha) if mirrored and alpha > _SMOOTH else 0.0,
         )
-
-
-def _sides() -> list[np.ndarray]:
-    """Transforms of the rectangle to the sides of the cube, facing outwards."""
-    made = []
-    for axis in range(3):
-        for sign in (1.0, -1.0):
-            matrix = np.eye(4)
-            normal, first = sign * np.eye(3)[axis], np.eye(3)[(axis + 1) % 3]
-            matrix[:3] = np.stack([first, np.cross(normal, first), normal, normal], axis=1)
-            made.append(matrix)
-    return made
 
 
 def spread_deg(alpha: float) -> float:

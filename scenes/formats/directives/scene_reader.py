@@ -47,6 +47,7 @@ from scenes.formats.directives.surfaces import SurfaceFactory
 from scenes.formats.directives.syntax import Directive, Parameters, parameters_of
 from scenes.formats.directives.window import ScreenWindow, fitted, window_of
 from scenes.formats.geometry.conventions import FAR, duration_s
+from scenes.formats.geometry.curves import joined
 from scenes.formats.geometry.recognition import shape_of
 from scenes.formats.geometry.transform_stack import inverse, motion, moved_by, translation
 
@@ -190,8 +191,6 @@ class SceneReader(DirectiveReader):
         self.film = dataclasses.replace(self.film, filter=name, filter_radius_px=radius)
         self.left_over(parameters, f"filter {kind!r}")
 
-    # --- lights --------------------------------------------------------------------------------------------------
-
     def placed(self, point: Any, default: tuple[float, float, float]) -> Rgb:
         at = np.asarray(default if point is None else point, np.float64)
         return rgb(product(self.transforms.current[0], np.append(at, 1.0))[:3])
@@ -206,6 +205,8 @@ class SceneReader(DirectiveReader):
 
     def _end_object(self, directive: Directive) -> None:
         self._end("Object", directive)
+        if self._object:
+            self._object[:] = joined(self._object)
         self._object = None
 
     def place_object(self, directive: Directive) -> None:
@@ -286,7 +287,7 @@ def scene_of(reader: SceneReader, path: Path) -> Scene:
         camera = fitted(camera, reader.window, reader.film, reader.report)
     scene = Scene(
         camera,
-        tuple(reader.instances),
+        tuple(joined(reader.instances)),
         tuple(reader.lights),
         reader.film,
         reader.sampler,

@@ -5,6 +5,7 @@ Source: PBRT v3 file format (https://www.pbrt.org/fileformat-v3), section on sha
 
 from __future__ import annotations
 
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -30,10 +31,12 @@ class ShapeReader:
     Attributes:
         files: source of mesh files.
         report: receives the losses.
+        more: functions that read the kinds of shapes of a dialect alone.
     """
 
     files: SceneFiles
     report: LossReport
+    more: Mapping[str, Callable[[Parameters, LossReport], Shape]] = field(default_factory=dict)
     _meshes: dict[Path, Mesh] = field(default_factory=dict)
 
     def made(self, kind: str, parameters: Parameters, turn_over: bool, beside: Path) -> tuple[Shape, Matrix] | None:
@@ -52,8 +55,10 @@ class ShapeReader:
             return turned(self._patches(parameters)) if turn_over else self._patches(parameters), UNMOVED
         if kind in ("sphere", "disk", "cylinder", "cone", "paraboloid", "hyperboloid"):
             return self._quadric(kind, parameters, turn_over)
+        if kind in self.more:
+            return self.more[kind](parameters, self.report), np.eye(4)
         parameters.asked.update(parameters.given)
-        if kind in ("curve", "hairfile"):
+        if kind == "hairfile":
             self.report.add(where, f"hair ({kind})")
         elif kind in ("nurbs", "heightfield", "stlmesh", "torus", "lenscomponent"):
             self.report.add(where, f"shape {kind!r}")

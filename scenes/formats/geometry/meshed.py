@@ -18,6 +18,7 @@ from scenes.arithmetic import product
 from scenes.canonical import (
     CheckerboardTexture,
     Cube,
+    Curves,
     Disk,
     HeightField,
     ImageTexture,
@@ -33,6 +34,7 @@ from scenes.canonical import (
 from scenes.canonical.values import Matrix
 from scenes.formats.appearance.graphs import once_a_node, parts_of
 from scenes.formats.appearance.normals import is_flat
+from scenes.formats.geometry.curves import curve_mesh
 from scenes.formats.geometry.orientation import area_normals, turned
 from scenes.formats.geometry.revolution import partial_sphere, ring
 
@@ -96,8 +98,15 @@ def turned_over(instance: Instance) -> Instance:
 
 
 def as_mesh(shape: Shape) -> Mesh:
-    """A shape as triangles: exact for rectangle and cube, approximate for sphere and disk."""
+    """A shape as triangles: exact for rectangle and cube, approximate for sphere, disk and curves."""
+    if isinstance(shape, Curves):
+        return curve_mesh(shape)
     return shape if isinstance(shape, Mesh) else _meshed(shape)
+
+
+def shape_name(shape: Shape) -> str:
+    """What a shape is called in reports."""
+    return "curves" if isinstance(shape, Curves) else f"a {type(shape).__name__.lower()}"
 
 
 @lru_cache(maxsize=256)
@@ -151,3 +160,15 @@ def about_middle(mesh: Mesh) -> tuple[NDArray[np.floating], Matrix | None]:
     middle = np.eye(4)
     middle[:3, 3] = 0.5 * (mesh.vertices.min(axis=0) + mesh.vertices.max(axis=0))
     return mesh.vertices - middle[:3, 3], middle
+
+
+def cube_sides() -> list[np.ndarray]:
+    """Transforms of the rectangle to the sides of the cube, facing outwards."""
+    made = []
+    for axis in range(3):
+        for sign in (1.0, -1.0):
+            matrix = np.eye(4)
+            normal, first = sign * np.eye(3)[axis], np.eye(3)[(axis + 1) % 3]
+            matrix[:3] = np.stack([first, np.cross(normal, first), normal, normal], axis=1)
+            made.append(matrix)
+    return made

@@ -18,6 +18,7 @@ from scenes.animation import pose_at
 from scenes.arithmetic import arctan, determinant, product, tan
 from scenes.canonical import (
     Camera,
+    Curves,
     Disk,
     Emissive,
     EnvironmentLight,
@@ -39,7 +40,7 @@ from scenes.daylight import sun_light
 from scenes.formats.appearance.media import without_media
 from scenes.formats.appearance.spot_profiles import reshaped
 from scenes.formats.geometry.conventions import FAR
-from scenes.formats.geometry.meshed import about_middle, as_mesh, depends_on_uv, rectangle_mesh
+from scenes.formats.geometry.meshed import about_middle, as_mesh, depends_on_uv, rectangle_mesh, shape_name
 from scenes.formats.geometry.placing import facing, has_two_sides, keys_from_zero, lose_undrawn_back, shines
 from scenes.formats.gltf.document import INDICES, VERTICES, Document, Json
 from scenes.formats.gltf.write_materials import GltfMaterialWriter
@@ -144,9 +145,9 @@ class GltfWriter:
     def _instance(self, instance: Instance, name: str) -> None:
         shape, both_sides = instance.shape, has_two_sides(instance)
         lose_undrawn_back(instance, name, self.report)
-        if isinstance(shape, Disk | Sphere):
+        if isinstance(shape, Disk | Sphere | Curves):
             became = f"a mesh of {len(as_mesh(shape).faces)} triangles"
-            self.report.add(name, f"a {type(shape).__name__.lower()}", became)
+            self.report.add(name, shape_name(shape), became)
         mesh = rectangle_mesh() if isinstance(shape, Rectangle) else as_mesh(shape)
         emission = instance.emission if shines(instance) and not isinstance(instance.material, Emissive) else None
         key = "mesh", id(mesh), id(instance.material), emission, both_sides

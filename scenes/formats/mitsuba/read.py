@@ -20,8 +20,8 @@ from scenes.formats.mitsuba.media import MitsubaMedia
 from scenes.formats.mitsuba.modern import in_old_words, is_modern
 from scenes.formats.mitsuba.read_lights import MitsubaLights
 from scenes.formats.mitsuba.read_materials import MitsubaSurfaces
-from scenes.formats.mitsuba.read_settings import MitsubaSettings
-from scenes.formats.mitsuba.read_shapes import MitsubaShapes, seeing_all
+from scenes.formats.mitsuba.read_settings import MitsubaSettings, seeing_all
+from scenes.formats.mitsuba.read_shapes import MitsubaShapes
 from scenes.formats.mitsuba.read_textures import MISSING
 from scenes.formats.text.scene_files import DEPTH_MAX, SceneFiles
 from scenes.formats.text.xml_tree import XmlNode, parse_xml

@@ -15,6 +15,7 @@ from scenes.canonical import (
     Camera,
     EnvironmentCamera,
     Film,
+    Instance,
     Integrator,
     Medium,
     OrthographicCamera,
@@ -23,6 +24,7 @@ from scenes.canonical import (
     SceneError,
 )
 from scenes.formats.geometry.conventions import FAR
+from scenes.formats.geometry.meshed import as_mesh
 from scenes.formats.geometry.transform_stack import motion
 from scenes.formats.losses import SAME_PICTURE, LossReport
 from scenes.formats.mitsuba.media import MitsubaMedia
@@ -170,3 +172,18 @@ class MitsubaSettings:
         if sides[axis] == min(width, height):
             return fov
         return math.degrees(2.0 * arctan(tan(math.radians(fov) / 2.0) * min(width, height) / sides[axis]))
+
+
+def seeing_all(instances: list[Instance]) -> PerspectiveCamera:
+    """The camera of a scene without one: it looks along z with 45 degrees, at a distance equal to the width of the
+    shapes."""
+    corners = [
+        product(as_mesh(one.shape).vertices.astype(np.float64), one.to_world[:3, :3].T) + one.to_world[:3, 3]
+        for one in instances
+    ]
+    points = np.concatenate(corners) if corners else np.array([[-1.0, -1.0, -1.0], [1.0, 1.0, 1.0]])
+    low, high = points.min(axis=0), points.max(axis=0)
+    away = float((high - low)[:2].max()) / (2.0 * tan(math.radians(22.5)))
+    to_world = np.diag([-1.0, 1.0, -1.0, 1.0])
+    to_world[:3, 3] = *(0.5 * (low + high))[:2], low[2] - max(away, 1e-3)
+    return PerspectiveCamera(to_world, 45.0)

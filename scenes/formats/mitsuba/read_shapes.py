@@ -6,23 +6,22 @@ Source: Mitsuba 0.5 documentation, section on shapes.
 from __future__ import annotations
 
 import dataclasses
-import math
 from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
 
-from scenes.arithmetic import determinant, norm, product, tan
+from scenes.arithmetic import determinant, norm, product
 from scenes.canonical import (
     ConstantTexture,
     Cube,
+    Curves,
     Disk,
     Instance,
     Material,
     Matte,
     Medium,
     Mesh,
-    PerspectiveCamera,
     Rectangle,
     Rgb,
     SceneError,
@@ -41,15 +40,17 @@ from scenes.formats.geometry.ply_files import read_ply
 from scenes.formats.geometry.recognition import shape_of
 from scenes.formats.geometry.transform_stack import motion, moved_by, translation
 from scenes.formats.losses import LossReport
+from scenes.formats.mitsuba.curves import curves_of, sized
 from scenes.formats.mitsuba.media import MitsubaMedia
 from scenes.formats.mitsuba.properties import Properties
 from scenes.formats.mitsuba.read_materials import MitsubaSurfaces
 from scenes.formats.text.scene_files import SceneFiles
 from scenes.formats.text.xml_tree import XmlNode
 
-_SHAPES = ("sphere", "rectangle", "cube", "disk", "cylinder", "obj", "ply", "serialized")
-_HAIR = ("hair", "bsplinecurve", "linearcurve")
-_LEFT_OUT = (*_HAIR, "heightfield", "deformable", "sdfgrid", "ellipsoids", "ellipsoidsmesh")
+_SHAPES = ("sphere", "rectangle", "cube", "disk", "cylinder", "obj", "ply", "serialized", "bsplinecurve", "linearcurve",
+           "hair")  # fmt: skip
+_CURVES = {"bsplinecurve": "bspline", "linearcurve": "linear", "hair": "linear"}
+_LEFT_OUT = ("heightfield", "deformable", "sdfgrid", "ellipsoids", "ellipsoidsmesh")
 _FLAT = ("rectangle", "disk")
 _DEFAULT = Matte(ConstantTexture(grey(0.5)))
 
@@ -69,6 +70,7 @@ class MitsubaShapes:
         self.groups: dict[int, list[Instance]] = {}
         self.modern = False
         self._meshes: dict[tuple, Mesh] = {}
+        self._read_curves: dict[tuple, Curves] = {}
         self._contents: dict[Path, bytes] = {}
         self._used: dict[Path, list[str]] = {}
 
@@ -90,7 +92,7 @@ class MitsubaShapes:
         if kind == "instance":
             return self._instances(properties)
         if kind in _LEFT_OUT:
-            self.report.add(properties.where, "hair" if kind in _HAIR else f"shape {kind!r}")
+            self.report.add(properties.where, f"shape {kind!r}")
             return []
         if kind not in _SHAPES:
             self.report.unknown(properties.where, "shape", kind)
@@ -110,6 +112,8 @@ class MitsubaShapes:
             if made is None:
                 return []
             shape, local = made
+            if isinstance(shape, Curves):
+                shape, keys = sized(shape, keys)
             if properties.truth("flipNormals", False):
                 shape = turned(as_mesh(shape))
             place = product(keys[0], local)
@@ -233,6 +237,9 @@ class MitsubaShapes:
             return mesh, place
         if kind == "cylinder":
             return self._cylinder(properties)
+        if kind in _CURVES:
+            found = curves_of(properties, _CURVES[kind], self.files, self._read_curves)
+            return None if found is None else (found, place)
         mesh = self._file(kind, properties, faces, material is _DEFAULT)
         return None if mesh is None else shape_of(mesh, material, where, self.report)
 
@@ -276,18 +283,3 @@ class MitsubaShapes:
             mesh = facing_normals(mesh) if not faceted else mesh
             self._meshes[key] = Mesh(mesh.vertices, mesh.faces, None if faceted else mesh.normals, uvs, str(path))
         return self._meshes[key]
-
-
-def seeing_all(instances: list[Instance]) -> PerspectiveCamera:
-    """The camera of a scene without one: it looks along z with 45 degrees, at a distance equal to the width of the
-    shapes."""
-    corners = [
-        product(as_mesh(one.shape).vertices.astype(np.float64), one.to_world[:3, :3].T) + one.to_world[:3, 3]
-        for one in instances
-    ]
-    points = np.concatenate(corners) if corners else np.array([[-1.0, -1.0, -1.0], [1.0, 1.0, 1.0]])
-    low, high = points.min(axis=0), points.max(axis=0)
-    away = float((high - low)[:2].max()) / (2.0 * tan(math.radians(22.5)))
-    to_world = np.diag([-1.0, 1.0, -1.0, 1.0])
-    to_world[:3, 3] = *(0.5 * (low + high))[:2], low[2] - max(away, 1e-3)
-    return PerspectiveCamera(to_world, 45.0)

@@ -14,6 +14,7 @@ from scenes.arithmetic import determinant, product
 from scenes.canonical import (
     Camera,
     Cube,
+    Curves,
     Disk,
     EnvironmentCamera,
     Instance,
@@ -43,8 +44,8 @@ from scenes.formats.geometry.placing import (
 )
 from scenes.formats.losses import LossReport, first_of
 from scenes.formats.mitsuba.read_settings import FILTERS, FORWARD
+from scenes.formats.mitsuba.write_curves import MitsubaCurveWriter
 from scenes.formats.mitsuba.write_elements import Element
-from scenes.formats.mitsuba.write_media import MitsubaMediumWriter
 from scenes.formats.text.numbers import number
 from scenes.formats.text.output import Output
 from scenes.formats.text.xml_tree import xml_text
@@ -59,7 +60,7 @@ _INTEGRATORS = {"path": "path", "direct": "direct", "whitted": "direct", "bidire
 
 
 @dataclass
-class MitsubaWriter(MitsubaMediumWriter):
+class MitsubaWriter(MitsubaCurveWriter):
     """Collects the elements of a scene; ``modern`` selects Mitsuba 3."""
 
     shared: frozenset[PartKey] = frozenset()
@@ -224,6 +225,8 @@ class MitsubaWriter(MitsubaMediumWriter):
         """Whether a shape must be written as triangles, because of its texture coordinates or as a non-uniformly scaled
         sphere."""
         shape, textured = instance.shape, self._depends_on_uv(instance.material)
+        if isinstance(shape, Curves):
+            return textured or not self.has_curves(instance)
         if isinstance(shape, Cube | Disk):
             return textured
         if not isinstance(shape, Sphere):
@@ -235,7 +238,9 @@ class MitsubaWriter(MitsubaMediumWriter):
         """The element of a shape without its placement, and the transform of its own size."""
         shape, material = instance.shape, instance.material
         if self._as_triangles(instance):
-            if isinstance(shape, Disk | Sphere):
+            if isinstance(shape, Curves):
+                self.report.add(instance.name or "shape", "curves", f"a mesh of {len(as_mesh(shape).faces)} triangles")
+            elif isinstance(shape, Disk | Sphere):
                 what = (
                     f"{'a textured' if self._depends_on_uv(material) else 'a stretched'} {type(shape).__name__.lower()}"
                 )
@@ -245,7 +250,8 @@ class MitsubaWriter(MitsubaMediumWriter):
         label, local = self.material(material, "", instance.one_sided), _UNMOVED
         mirrored = determinant(instance.to_world) < 0.0
         kinds: dict[type, str] = {Sphere: "sphere", Disk: "disk", Rectangle: "rectangle", Cube: "cube", Mesh: "ply"}
-        made = self.plugin("shape", kinds[type(shape)])
+        curves = isinstance(shape, Curves)
+        made = self.curves(instance) if curves else self.plugin("shape", kinds[type(shape)])
         if isinstance(shape, Mesh):
             if has_outside(instance) and mirrored:
                 # lamps and media have their outside where the placed faces are counter-clockwise

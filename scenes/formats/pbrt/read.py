@@ -20,6 +20,7 @@ from scenes.formats.directives.reader import typed, word
 from scenes.formats.directives.scene_reader import SceneReader
 from scenes.formats.directives.syntax import Directive, Parameters
 from scenes.formats.losses import SAME_PICTURE
+from scenes.formats.pbrt.curves import read_curve
 from scenes.formats.pbrt.media import PbrtMedia
 from scenes.formats.pbrt.read_materials import PbrtSurfaces
 
@@ -54,6 +55,7 @@ class PbrtReader(SceneReader):
     def __post_init__(self) -> None:
         super().__post_init__()
         self.media = PbrtMedia(self.surfaces, self.report)
+        self.shapes.more = {"curve": read_curve}
 
     def make_surfaces(self) -> PbrtSurfaces:
         return PbrtSurfaces(self.files, self.report, self.names)

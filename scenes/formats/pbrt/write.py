@@ -15,6 +15,7 @@ from scenes.arithmetic import product
 from scenes.canonical import (
     Camera,
     ConstantTexture,
+    Curves,
     DirectionalLight,
     Disk,
     EnvironmentLight,
@@ -48,6 +49,7 @@ from scenes.formats.geometry.placing import (
 )
 from scenes.formats.geometry.transform_stack import inverse, track_times
 from scenes.formats.losses import LossReport, first_of
+from scenes.formats.pbrt.curves import curve_lines
 from scenes.formats.pbrt.read import PbrtReader
 from scenes.formats.pbrt.write_materials import PICTURES, PbrtSurfaceWriter
 from scenes.formats.text.numbers import listed, number, written_matrix
@@ -193,14 +195,14 @@ class PbrtWriter(PbrtSurfaceWriter, SceneWriter):
         material = instance.material
         emission = radiance_of(instance)
         if is_nothing(material) and emission is None:
-            return [f'Material "{self.nothing}"', *self._sides(instance), self._shape(instance)]
+            return [f'Material "{self.nothing}"', *self._sides(instance), *self._shapes(instance)]
         named = self.material(material.base if isinstance(material, Masked) else material)
         alpha = f" {self._alpha(material)}" if isinstance(material, Masked) else ""
         lines = [f'NamedMaterial "{named}"', *self._sides(instance)]
         if emission is not None:
             both = ' "bool twosided" [ "true" ]' if shines_behind(instance) else ""
             lines.append(f'AreaLightSource "diffuse" "rgb L" {listed(emission)}{both}')
-        return [*lines, f"{self._shape(instance)}{alpha}"]
+        return [*lines, *(f"{line}{alpha}" for line in self._shapes(instance))]
 
     def medium_line(self, medium: Medium, name: str) -> str:
         parts = f'"rgb sigma_a" {listed(medium.absorption)} "rgb sigma_s" {listed(medium.scattering)}'
@@ -226,6 +228,11 @@ class PbrtWriter(PbrtSurfaceWriter, SceneWriter):
                 self.report.add("shape", "an opacity for each colour", "by their mean")
             return f'"float alpha" [ {number(float(np.mean(opacity.value)))} ]'
         return self.texture(opacity, "alpha", "float")
+
+    def _shapes(self, instance: Instance) -> list[str]:
+        if isinstance(instance.shape, Curves):
+            return list(curve_lines(instance.shape, self.report, instance.name or "shape"))
+        return [self._shape(instance)]
 
     def _shape(self, instance: Instance) -> str:
         shape = instance.shape

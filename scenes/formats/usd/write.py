@@ -21,6 +21,7 @@ from scenes.arithmetic import determinant, product, tan
 from scenes.canonical import (
     Camera,
     Cube,
+    Curves,
     Disk,
     Emissive,
     Film,
@@ -35,7 +36,7 @@ from scenes.canonical import (
 from scenes.canonical.values import Matrix, RigidTrack
 from scenes.formats.appearance.media import without_media
 from scenes.formats.geometry.conventions import aspect_of
-from scenes.formats.geometry.meshed import about_middle, as_mesh, depends_on_uv, rectangle_mesh
+from scenes.formats.geometry.meshed import about_middle, as_mesh, depends_on_uv, rectangle_mesh, shape_name
 from scenes.formats.geometry.placing import has_two_sides, keys_from_zero, lose_undrawn_back, shines
 from scenes.formats.losses import LossReport, without_settings
 from scenes.formats.text.output import Output
@@ -173,9 +174,9 @@ class UsdWriter:
             made = UsdGeom.Cube.Define(self.stage, path)
             made.CreateSizeAttr(2.0)
         else:
-            if isinstance(shape, Disk | Sphere):
+            if isinstance(shape, Disk | Sphere | Curves):
                 became = f"a mesh of {len(as_mesh(shape).faces)} triangles"
-                self.report.add(name, f"a {type(shape).__name__.lower()}", became)
+                self.report.add(name, shape_name(shape), became)
             mesh = rectangle_mesh() if isinstance(shape, Rectangle) else as_mesh(shape)
             made, middle = self._mesh(mesh, path, textured)
             matrix = matrix if middle is None else product(matrix, middle)
