@@ -140,7 +140,7 @@ UNKNOWN = [
         (pbrt, "a.pbrt:4:1", 'Shape "sphere"', body, loss)
         for body, loss in (
             ('Shape "blob" "float size" 2', "shape 'blob', which is not known: left out"),
-            ('Shape "curve"', "hair (curve): left out"),
+            ('Shape "nurbs"', "shape 'nurbs': left out"),
             ('Material "plaster" "rgb c" [1 1 1]', "material 'plaster', which is not known: grey, matte"),
             ('LightSource "bulb" "float watts" 60', "light 'bulb', which is not known: left out"),
             ('Texture "t" "color" "cells" "float size" 2', "texture 'cells', which is not known: the constant 0.5"),
@@ -156,7 +156,7 @@ UNKNOWN = [
         (mitsuba, "a.xml:3:1", '<shape type="sphere"/>', body, loss)
         for body, loss in (
             ('<shape type="blob"><float name="size" value="2"/></shape>', "shape 'blob', which is not known: left out"),
-            ('<shape type="hair"/>', "hair: left out"),
+            ('<shape type="heightfield"/>', "shape 'heightfield': left out"),
             ('<bsdf type="plaster"/>', "material 'plaster', which is not known: grey, matte"),
             (
                 '<emitter type="bulb"><float name="w" value="6"/></emitter>',

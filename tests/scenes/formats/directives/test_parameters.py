@@ -73,7 +73,8 @@ NOTHING = {
 CANDIDATES = (
     '"float {}" 0.37', '"float {}" 3', '"float {}" 40', '"rgb {}" [ .11 .22 .33 ]', '"texture {}" "tt"',
     '"bool {}" "true"', '"bool {}" "false"', '"string {}" "nosuch"', '"string {}" "clamp"',
-    '"string {}" "nearest"', '"string {}" "point"', '"point {}" [ .3 .4 .5 ]',
+    '"string {}" "bspline"', '"integer {}" 2', '"string {}" "nearest"', '"string {}" "point"',
+    '"point {}" [ .3 .4 .5 ]',
     '"float {}" [ -1 3 -2 2 ]', '"float {}" [ 0 0 1 0 0 1 ]', '"float {}" [ 0 0 1 0 0 1 1 1 ]',
     '"normal {}" [ 0 0 1 0 .6 .8 0 0 1 ]', '"normal {}" [ 0 0 1 0 .6 .8 0 0 1 0 0 1 ]', '"integer {}" [ 0 1 2 0 ]',
     '"point {}" [ 0 0 0 2 0 0 0 1 0 ]', '"point {}" [ 0 0 0 2 0 0 0 1 0 3 1 0 ]', '"integer {}" [ 0 2 1 ]',
@@ -98,6 +99,8 @@ def texts(dialect: str) -> Iterator[str]:
     yield from (
         f'{bare}{{}}Integrator "volpath"\n'.replace("{}", f'{one}Shape "sphere"\n') for one in found.media.split("|")
     )
+    if dialect != "luxrender":
+        yield f'{bare}Shape "curve" {{}} "point P" [ 0 0 0 1 1 0 2 0 0 3 1 0 4 0 0 5 1 0 6 0 1 ]\n'
     if dialect == "pbrt4":
         yield f'{bare}Shape "bilinearmesh" {{}} {POINTS.replace("0 1 0 ]", "0 1 0 1 1 0 ]").replace("2 ]", "2 3 ]")}\n'
     use = f'Material "{materials[0]}" "texture {found.base}" "t"\nShape "sphere"\n'

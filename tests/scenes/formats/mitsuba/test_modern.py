@@ -134,9 +134,9 @@ def test_plugins_of_mitsuba_3(tmp_path: Path) -> None:
     assert made.ior == pytest.approx(1.5) and made.base == ConstantTexture((0.6, 0.4, 0.2))
     assert len(losses) == 2 and "sheen" in losses[0]
     body = '<shape type="sphere"><bsdf type="bumpmap"><texture type="checkerboard"/><float name="scale" value="2"/>'
-    scene, losses = of(tmp_path, body + '<bsdf type="diffuse"/></bsdf></shape><shape type="bsplinecurve"/>')
+    scene, losses = of(tmp_path, body + '<bsdf type="diffuse"/></bsdf></shape><shape type="sdfgrid"/>')
     assert isinstance(scene.instances[0].material, Bumped) and scene.instances[0].material.scale == 2.0
-    assert len(losses) == 1 and "hair" in losses[0]
+    assert len(losses) == 1 and "shape 'sdfgrid'" in losses[0]
     scene, losses = of(tmp_path, '<emitter type="sunsky"><float name="sun_scale" value="0"/></emitter>')
     (sky,) = scene.lights
     assert isinstance(sky, SunSky) and sky.part == "sky" and sky.ground_albedo == 0.3

@@ -69,6 +69,8 @@ def texts(version: str) -> Iterator[tuple[str, str]]:
     for kind, first in inside.items():
         texture = f'<texture type="{kind}" name="reflectance">{first}{{}}</texture>'
         yield kind, ball.format(f'<bsdf type="diffuse">{texture}</bsdf>')
+    for kind in ("hair",) if version.startswith("0") else ("bsplinecurve", "linearcurve"):
+        yield kind, f'<shape type="{kind}"><string name="filename" value="{kind}.txt"/>{{}}</shape>'
     mesh = "ply" if version.startswith("0") else "obj"
     yield mesh, f'<shape type="{mesh}"><string name="filename" value="a.{mesh}"/>{{}}</shape>'
 
@@ -78,6 +80,8 @@ def files(folder: Path) -> None:
     Image.fromarray(np.random.default_rng(0).integers(0, 256, (4, 4, 3), np.uint8)).save(folder / "a.png")
     corners = [(0, 0, 0), (1, 0, 0), (1, 1, 0.2), (0, 1, 0)]
     lines = [f"v {x} {y} {z}\nvt {x} {0.9 * y}\nvn 0 0.1 1" for x, y, z in corners]
+    for kind, width in (("hair", 3), ("bsplinecurve", 4), ("linearcurve", 4)):
+        (folder / f"{kind}.txt").write_text("".join(f"{' '.join([str(n + 1)] * width)}\n" for n in range(4)))
     (folder / "a.obj").write_text("\n".join([*lines, "f 1/1/1 2/2/2 3/3/3", "f 1/1/1 3/3/3 4/4/4", ""]))
     names = "".join(f"property float {name}\n" for name in "x y z nx ny nz u v".split())
     rows = "".join(f"{x} {y} {z} 0 0.1 1 {x} {0.9 * y}\n" for x, y, z in corners)
