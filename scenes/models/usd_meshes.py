@@ -5,7 +5,7 @@ Source: OpenUSD documentation, UsdGeomMesh and UsdGeomPrimvar.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -13,8 +13,12 @@ from jaxtyping import Int
 from numpy.typing import NDArray
 
 from scenes.canonical import SceneError
+from scenes.formats.geometry.subdivision import Refined
 from scenes.formats.losses import LossReport
+from scenes.models.smoothing import corner_normals
 from scenes.models.usd_library import UsdGeom
+from scenes.models.usd_subdivision import SMOOTH_DEG, surface_of
+from scenes.models.usd_values import array_of
 
 _POLYGONS_MOST = 1 << 28
 
@@ -29,6 +33,8 @@ class Triangles:
         corner: index of each corner among the corners of all polygons.
         polygon: index of the polygon of each triangle.
         polygons: number of polygons, of which some may have no triangles.
+        surface: the subdivision surface whose polygons they are; None for polygons as they are. Values of primvars
+            are of its cage, and the index of a polygon is that of the cage.
     """
 
     points: NDArray[np.float64]
@@ -36,10 +42,11 @@ class Triangles:
     corner: Int[NDArray[np.int64], "f 3"]
     polygon: Int[NDArray[np.int64], " f"]
     polygons: int
+    surface: Refined | None = None
 
     def of(self, kept: NDArray[np.bool_]) -> Triangles:
         """Some of the triangles."""
-        return Triangles(self.points, self.at[kept], self.corner[kept], self.polygon[kept], self.polygons)
+        return replace(self, at=self.at[kept], corner=self.corner[kept], polygon=self.polygon[kept])
 
 
 def triangles_of(mesh: Any, code: Any, where: str, report: LossReport) -> Triangles | None:
@@ -69,12 +76,14 @@ def triangles_of(mesh: Any, code: Any, where: str, report: LossReport) -> Triang
     if len(indices) and not (indices.min() >= 0 and indices.max() < len(points)):
         wrong = indices[(indices < 0) | (indices >= len(points))][0]
         raise SceneError(f"cannot be read: {where}: a face refers to vertex {wrong} of {len(points)}")
-    scheme = mesh.GetSubdivisionSchemeAttr().Get()
-    if scheme != "none":
-        report.add(where, f"subdivision {scheme}", "the cage")
-    parts = np.maximum(counts - 2, 0)
     holes = array_of(mesh.GetHoleIndicesAttr().Get(code), 0).astype(np.int64)
-    parts[holes[(holes >= 0) & (holes < len(parts))]] = 0
+    hole = np.isin(np.arange(len(counts)), holes)
+    polygons, of_polygon = len(counts), np.arange(len(counts))
+    surface = surface_of(mesh, code, len(points), counts, indices, where, report)
+    if surface is not None:
+        points, counts, indices = surface.smooth @ points, surface.cage.counts, surface.cage.indices
+        of_polygon = surface.polygon
+    parts = np.where(hole[of_polygon], 0, np.maximum(counts - 2, 0))
     polygon = np.repeat(np.arange(len(counts)), parts)
     if not len(polygon):
         return None
@@ -83,15 +92,7 @@ def triangles_of(mesh: Any, code: Any, where: str, report: LossReport) -> Triang
     corner = np.stack([first, first + within + 1, first + within + 2], axis=1)
     if mesh.GetOrientationAttr().Get() == UsdGeom.Tokens.leftHanded:
         corner = corner[:, ::-1]
-    return Triangles(points, indices[corner], corner, polygon, len(counts))
-
-
-def array_of(values: Any, width: int) -> NDArray[np.float64]:
-    """Values of an attribute ``(n, width)``, or ``(n,)`` for a width of 0; empty without a value."""
-    if values is None:
-        return np.zeros((0, width) if width else 0)
-    found = np.array(values, np.float64)
-    return found.reshape(-1, width) if width else found.reshape(-1)
+    return Triangles(points, indices[corner], corner, of_polygon[polygon], polygons, surface)
 
 
 def at_corners(
@@ -111,10 +112,11 @@ def at_corners(
     index = {"constant": np.zeros_like(polygon), "uniform": polygon, "faceVarying": triangles.corner}.get(
         interpolation, triangles.at
     )
-    if len(values) <= index.max(initial=0):
+    refine = triangles.surface and triangles.surface.of(interpolation)
+    if len(values) < (index.max(initial=0) + 1 if refine is None else refine.shape[1]):
         report.add(where, f"{what} ({interpolation}) with {len(values)} values")
         return None
-    return values[index]
+    return (values if refine is None else refine @ values[: refine.shape[1]])[index]
 
 
 def primvar_at_corners(
@@ -142,7 +144,10 @@ def primvar_at_corners(
 def normals_at_corners(
     mesh: Any, triangles: Triangles, code: Any, where: str, report: LossReport
 ) -> NDArray[np.float64] | None:
-    """Normals ``(f, 3, 3)`` of a mesh, not normalised and not all finite; None if it has none."""
+    """Normals ``(f, 3, 3)`` of a mesh, not normalised and not all finite; None if it has none. Those of a subdivision
+    surface are its own, as in USD: normals of the file do not count."""
+    if triangles.surface is not None:
+        return corner_normals(triangles.points[triangles.at], SMOOTH_DEG).astype(np.float64)
     primvar = UsdGeom.PrimvarsAPI(mesh.GetPrim()).GetPrimvar("normals")
     if primvar and primvar.HasValue():
         found = primvar_at_corners(mesh.GetPrim(), "normals", 3, triangles, code, where, report)

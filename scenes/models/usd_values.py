@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from scenes.canonical import SceneError
 from scenes.formats.losses import LossReport
@@ -24,6 +25,14 @@ def finite(value: Any, where: object) -> Any:
     if numbers.dtype.kind == "f" and not np.isfinite(numbers).all():
         raise SceneError(f"cannot be read: {where}: expected finite numbers, got {value}")
     return value
+
+
+def array_of(values: Any, width: int) -> NDArray[np.float64]:
+    """Values of an attribute ``(n, width)``, or ``(n,)`` for a width of 0; empty without a value."""
+    if values is None:
+        return np.zeros((0, width) if width else 0)
+    found = np.array(values, np.float64)
+    return found.reshape(-1, width) if width else found.reshape(-1)
 
 
 def report_animated(prim: Any, report: LossReport) -> None:
