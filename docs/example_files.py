@@ -1,5 +1,5 @@
 """Writes the files of docs/guides/tasks.md: models that each show one feature of glTF, a sky, keys of a camera, an OBJ
-with materials, the same far from the origin, a large mesh and the answers of a study.
+with materials, the same far from the origin, a large mesh, a model in USD and the answers of a study.
 
 Usage: python docs/example_files.py [FOLDER]
 """
@@ -43,6 +43,36 @@ def _quads(offset: float) -> str:
     for name, faces in sides.items():
         lines += [f"usemtl {name}", *(f"f {a} {b} {c} {d}" for a, b, c, d in faces)]
     return "\n".join(lines) + "\n"
+
+
+ROUNDED = """#usda 1.0
+(
+    defaultPrim = "Model"
+    upAxis = "Y"
+    metersPerUnit = 0.01
+)
+def Xform "Model" {
+    def Mesh "body" {
+        int[] faceVertexCounts = [4, 4, 4, 4, 4, 4]
+        int[] faceVertexIndices = [0, 1, 3, 2, 4, 6, 7, 5, 0, 4, 5, 1, 2, 3, 7, 6, 0, 2, 6, 4, 1, 5, 7, 3]
+        point3f[] points = [(-1,-1,-1), (-1,-1,1), (-1,1,-1), (-1,1,1), (1,-1,-1), (1,-1,1), (1,1,-1), (1,1,1)]
+        uniform token subdivisionScheme = "catmullClark"
+        int[] creaseIndices = [2, 3, 7, 6, 2]
+        int[] creaseLengths = [5]
+        float[] creaseSharpnesses = [10]
+        rel material:binding = </Model/Red>
+    }
+    def Material "Red" {
+        token outputs:surface.connect = </Model/Red/Surface.outputs:surface>
+        def Shader "Surface" {
+            uniform token info:id = "UsdPreviewSurface"
+            color3f inputs:diffuseColor = (0.7, 0.1, 0.1)
+            float inputs:roughness = 0.3
+            token outputs:surface
+        }
+    }
+}
+"""
 
 
 def _large(side: int = 502) -> bytes:
@@ -89,6 +119,7 @@ def main(folder: Path) -> None:
     (folder / "quads.obj").write_text(_quads(0.0), encoding="utf-8")
     (folder / "far.obj").write_text(_quads(4_500_000.0), encoding="utf-8")
     (folder / "large.ply").write_bytes(_large())
+    (folder / "rounded.usda").write_text(ROUNDED, encoding="utf-8")
     (folder / "trials.csv").write_text(_trials(), encoding="utf-8")
 
 

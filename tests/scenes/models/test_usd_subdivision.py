@@ -52,7 +52,8 @@ def test_creases_are_sharp_and_shaded_so(tmp_path: Path) -> None:
 def test_values_follow_the_surface_or_their_polygons(tmp_path: Path) -> None:
     """Values at points are refined as points are; those of polygons, and at their corners, stay within them."""
     path, report = written(tmp_path, mesh(shape=CUBE)), LossReport()
-    prim = UsdGeom.Mesh(Usd.Stage.Open(str(path)).GetPrimAtPath("/quad"))
+    stage = Usd.Stage.Open(str(path))  # a prim does not keep it
+    prim = UsdGeom.Mesh(stage.GetPrimAtPath("/quad"))
     triangles = triangles_of(prim, 0.0, "quad", report)
     assert triangles is not None
 

@@ -85,7 +85,7 @@ def test_sharp_edges_keep_their_place_and_end_at_their_level() -> None:
     assert always[0] == pytest.approx((-1.0, -2 / 3, -2 / 3), abs=0.01), "the limit is the cubic spline of the rim"
     soft, once = (refined(cage(QUADS, RIM, [s] * 4), "catmullClark").smooth @ POINTS for s in (0.0, 1.0))
     half = refined(cage(QUADS, RIM, [0.5] * 4), "catmullClark").smooth @ POINTS
-    assert soft[:, 0].min() > half[:, 0].min() > once[:, 0].min() > always[:, 0].min()
+    assert soft[0, 0] > half[0, 0] > once[0, 0] > always[0, 0]
 
 
 def test_a_cube_of_sharp_corners_and_edges_stays_a_cube() -> None:
