@@ -51,7 +51,8 @@ def test_there_are_sixteen_tasks() -> None:
 
 
 SIZES = {"lens": (800, 600), "large": (200, 150), "cut-out": (100, 75), "usd": (100, 75), "quads": (200, 150),
-         "far": (200, 150), "upright": (200, 150), "resumed": (100, 75), "crop": (100, 75), "adaptive": (100, 75)}  # fmt: skip
+         "far": (200, 150), "upright": (200, 150), "resumed": (100, 75), "crop": (100, 75),
+         "adaptive": (100, 75)}  # fmt: skip
 
 
 @pytest.mark.parametrize("name", SIZES)
