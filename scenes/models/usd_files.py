@@ -22,6 +22,7 @@ from scenes.models.gltf_materials import GltfMaterials
 from scenes.models.model import Model, ModelCamera
 from scenes.models.smoothing import unit_normals, with_corners
 from scenes.models.sources import Sources
+from scenes.models.usd_curves import curves_of
 from scenes.models.usd_instances import PointInstances, prims_of
 from scenes.models.usd_library import Gf, Tf, Usd, UsdGeom, UsdLux, UsdShade, UsdSkel, UsdUtils
 from scenes.models.usd_materials import UsdMaterials
@@ -196,7 +197,10 @@ class _Reader:
             self.report.add(name, "an opacity without a material", "opaque")
         if prim.IsA(UsdGeom.Mesh):
             return self._mesh(UsdGeom.Mesh(prim), name)
-        if kind not in SHAPES:
+        curves = curves_of(prim, self.code, name, self.report) if kind == "BasisCurves" else None
+        if kind == "BasisCurves" and curves is None:
+            return []
+        if kind not in (*SHAPES, "BasisCurves"):
             self.report.add(name, f"a prim of kind {kind}")
             return []
         number, colors = self.described.number(self._bound(prim), bool(UsdGeom.Gprim(prim).GetDoubleSidedAttr().Get()))
@@ -209,7 +213,8 @@ class _Reader:
             color = finite(_GREY if not found else np.array(found[0], np.float64), f"{name}: primvar {colors}")
             color = np.broadcast_to(color, (1, 3, 3))
         material = self.materials.painted(number, {}, color).material
-        return [(shape, material, local) for shape, local in shapes_of(prim, self.code)]
+        shapes = shapes_of(prim, self.code) if curves is None else [(curves, np.eye(4))]
+        return [(shape, material, local) for shape, local in shapes]
 
     def _mesh(self, mesh: Any, name: str) -> list[_Part]:
         """The parts of a mesh, one for each material."""

@@ -23,7 +23,8 @@ STRAIGHT = 0.05
 
 _STEPS_MAX = 32  # chords of a segment
 
-_TO_BEZIER = np.array([[1.0, 4.0, 1.0, 0.0], [0.0, 4.0, 2.0, 0.0], [0.0, 2.0, 4.0, 0.0], [0.0, 1.0, 4.0, 1.0]]) / 6.0
+TO_BEZIER = np.array([[1.0, 4.0, 1.0, 0.0], [0.0, 4.0, 2.0, 0.0], [0.0, 2.0, 4.0, 0.0], [0.0, 1.0, 4.0, 1.0]]) / 6.0
+"""Control points of a Bézier curve from four of a uniform cubic B-spline."""
 _TO_BSPLINE = np.array([[6.0, -7.0, 2.0, 0.0], [0.0, 2.0, -1.0, 0.0], [0.0, -1.0, 2.0, 0.0], [0.0, 2.0, -7.0, 6.0]])
 _RAISED = np.array([[1.0, 0.0], [2.0 / 3.0, 1.0 / 3.0], [1.0 / 3.0, 2.0 / 3.0], [0.0, 1.0]])
 
@@ -40,7 +41,7 @@ def bezier_segments(curves: Curves) -> Segments:
     begins = np.concatenate([[0], np.cumsum(curves.counts)[:-1]])
     number = np.arange(len(of)) - np.repeat(np.cumsum(count) - count, count)
     found = controls[(begins[of] + step * number)[:, None] + np.arange(width)]
-    matrix = {"linear": _RAISED, "bezier": np.eye(4), "bspline": _TO_BEZIER}[curves.basis]
+    matrix = {"linear": _RAISED, "bezier": np.eye(4), "bspline": TO_BEZIER}[curves.basis]
     return product(matrix, found), of
 
 
