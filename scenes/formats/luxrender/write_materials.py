@@ -155,8 +155,8 @@ class LuxSurfaceWriter(SurfaceWriter):
         else:
             color = np.array(reflectance_of_index(material.eta, material.k)) * mean_of(material.reflectance_scale)
             self.definitions.append(f'\tTexture "{label}" "fresnel" "fresnelcolor" "color Kr" {listed(color)}')
-            if material.k != (0.0, 0.0, 0.0) or not plain:
-                self.report.add(where, "the complex index of a metal", "its colour at normal incidence")
+            what = "the complex index of a metal" if material.k != (0.0, 0.0, 0.0) else "the index of a metal"
+            self.report.add(where, what, "its colour at normal incidence, which LuxCore draws brighter")
         return "metal2", [f'"texture fresnel" [ "{label}" ]', self.facets(material)]
 
 
