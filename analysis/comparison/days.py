@@ -17,7 +17,6 @@ from analysis.command.console import Table
 from analysis.comparison.finished import named_folders, read_summary
 from analysis.page.comparer import Comparer, Panel, Step, read_comparer
 from analysis.page.curves import Curve, Plot
-from analysis.page.figures import INKS
 from analysis.page.report import Report, flat
 from analysis.storage.results import SUMMARY
 
@@ -195,7 +194,7 @@ def _plots(runs: Sequence[FinishedRun]) -> Iterable[Plot]:
             values = tuple(run.summary["mse"][name])
             if values not in seen:
                 seen.add(values)
-                style = len(errors) % len(INKS)
+                style = len(errors)
                 errors.append(Curve(f"{run.name}: {name}", run.summary["reference_time_s"], values, style))
     yield Plot("Mean squared error of the shown image", "", errors)
     first = runs[0]
@@ -203,8 +202,6 @@ def _plots(runs: Sequence[FinishedRun]) -> Iterable[Plot]:
     for number, run in enumerate(runs[1:], 1):
         if run.summary["reference_time_s"] == first.summary["reference_time_s"]:
             ratio = np.asarray(run.summary["mse"][run.own]) / np.asarray(first.summary["mse"][first.own])
-            ratios.append(
-                Curve(f"{run.name}: {run.own}", run.summary["reference_time_s"], ratio.tolist(), number % len(INKS))
-            )
+            ratios.append(Curve(f"{run.name}: {run.own}", run.summary["reference_time_s"], ratio.tolist(), number))
     if ratios:
         yield Plot(f"Error of each policy over that of {first.own} in {first.name}", "", ratios, level=1.0)

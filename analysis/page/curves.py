@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from analysis.page.figures import DASHES, spread
+from analysis.page.figures import dashes_of, ink_of, spread
 
 # size of a plot in units of its view box
 WIDTH = 560.0
@@ -203,4 +203,4 @@ def _line(curve: Curve, axis: _Axis) -> Line:
             # a point starts a new segment if the one before it is missing
             points.append(f"{'L' if before else 'M'}{axis.x(time_s):.1f} {drawn:.1f}")
         before = here
-    return Line("".join(points), Label(curve.label, 0, 0), drawn, curve.style, DASHES[curve.style % len(DASHES)])
+    return Line("".join(points), Label(curve.label, 0, 0), drawn, ink_of(curve.style), dashes_of(curve.style))

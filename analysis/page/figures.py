@@ -47,26 +47,37 @@ def save(figure: Figure, path: Path, dpi: int = 130) -> None:
 
 
 def styles(runs: Sequence[str], own: str) -> dict[str, int]:
-    """The number of ink and dashes of each run: 0 for ``own``; those of the rivals repeat if there are many."""
-    rivals = itertools.cycle(range(1, len(INKS)))
+    """The number of ink and dashes of each run: 0 for ``own``, and from 1 on for its rivals."""
+    rivals = itertools.count(1)
     return {name: 0 if name == own else next(rivals) for name in runs}
 
 
 def inks(runs: Sequence[str], own: str) -> dict[str, str]:
     """The ink of each run."""
-    return {name: INKS[style] for name, style in styles(runs, own).items()}
+    return {name: INKS[ink_of(style)] for name, style in styles(runs, own).items()}
+
+
+def ink_of(style: int) -> int:
+    """Index of the ink of a style; inks repeat from the seventh rival on, and that of style 0 does not."""
+    return 1 + (style - 1) % (len(INKS) - 1) if style else 0
+
+
+def dashes_of(style: int) -> str:
+    """Dash pattern of a style: an ink that repeats has another pattern each time, so that 37 styles differ."""
+    turns = (style - 1) // (len(INKS) - 1) if style else 0
+    return DASHES[1 + (ink_of(style) - 1 + turns) % (len(DASHES) - 1)] if style else DASHES[0]
 
 
 def dashed(style: int, width: float = 1.0) -> Any:
     """Dashes of a matplotlib line of the given width in points; matplotlib multiplies them by the width."""
-    dashes = tuple(float(length) / width for length in DASHES[style % len(DASHES)].split())
+    dashes = tuple(float(length) / width for length in dashes_of(style).split())
     return (0, dashes) if dashes else "solid"
 
 
 def line_style(style: int) -> dict:
     """Ink, dashes and width of a matplotlib line."""
     width = 2.0 if style == 0 else 1.4
-    ink = INKS[style % len(INKS)]
+    ink = INKS[ink_of(style)]
     return {"color": ink, "linewidth": width, "linestyle": dashed(style, width), "zorder": 3 - 0.1 * style}
 
 

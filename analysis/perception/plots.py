@@ -12,7 +12,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from analysis.page.figures import FRAMED, INKS, MARKERS, label_ends, line_style
+from analysis.page.figures import FRAMED, INKS, MARKERS, ink_of, label_ends, line_style
 from analysis.perception.psychometrics import TWO_ALTERNATIVES, Rule, correct_share
 
 
@@ -53,7 +53,7 @@ def psychometric_figure(
 
 def _curve(axis: Axes, part: pd.DataFrame, row: Mapping[str, Any], label: str, style: int, guess: float) -> None:
     """Means over observers with their standard errors, and the fitted function."""
-    ink = INKS[style % len(INKS)]
+    ink = INKS[ink_of(style)]
     shares = part.pivot_table("correct", "observer", "samples")
     levels = np.asarray(shares.columns, np.float64)
     by_level = [column[np.isfinite(column)] for column in shares.to_numpy(np.float64).T]

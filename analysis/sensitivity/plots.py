@@ -15,7 +15,7 @@ from matplotlib.patches import Rectangle
 from matplotlib.ticker import LogLocator
 from PIL import Image
 
-from analysis.page.figures import ADAPTIVE, GRID, INKS, MARKERS, label_ends, line_style, save
+from analysis.page.figures import ADAPTIVE, GRID, INKS, MARKERS, ink_of, label_ends, line_style, save
 from analysis.page.pictures import RATE_MAP, number
 
 if TYPE_CHECKING:
@@ -230,5 +230,5 @@ def _line(axis: Axes, lines: Lines, column: str, style: int, name: str) -> None:
     axis.plot(at, ratio, label=name, **line_style(style))
     marked = [line for line in lines if line["default"]]
     where, height = ([line[key] for line in marked] for key in (column, "ratio"))
-    axis.plot(where, height, "*", color=INKS[style % len(INKS)], markeredgecolor="black", markersize=13, zorder=4,
+    axis.plot(where, height, "*", color=INKS[ink_of(style)], markeredgecolor="black", markersize=13, zorder=4,
               label="_default")  # fmt: skip

@@ -10,7 +10,18 @@ import pytest
 from matplotlib.figure import Figure
 from PIL import Image, ImageColor
 
-from analysis.page.figures import DASHES, INKS, MARKERS, label_ends, line_style, new_figure, save
+from analysis.page.figures import (
+    DASHES,
+    INKS,
+    MARKERS,
+    dashes_of,
+    ink_of,
+    label_ends,
+    line_style,
+    new_figure,
+    save,
+    styles,
+)
 
 ROOT = Path(__file__).resolve().parents[3] / "analysis"
 SHARED = "page/figures.py"
@@ -75,6 +86,13 @@ def test_inks_dashes_and_marks_differ_in_grey() -> None:
     """Neighbouring lines differ in dashes, and points in marks, whatever grey their inks become."""
     assert len(set(INKS)) == len(set(DASHES)) == len(set(MARKERS)) == len(INKS)
     assert all(max(ImageColor.getrgb(ink)) - min(ImageColor.getrgb(ink)) > 60 for ink in INKS if ink != "#000000")
+
+
+def test_many_rivals_have_a_style_each() -> None:
+    """Their inks repeat, with other dashes."""
+    many = [(ink_of(style), dashes_of(style)) for style in styles([str(n) for n in range(37)], "0").values()]
+    assert len(set(many)) == 37 and [ink for ink, _ in many].count(0) == 1
+    assert len({dashes for _, dashes in many[:7]}) == len({ink for ink, _ in many[:7]}) == 7
 
 
 @pytest.fixture
