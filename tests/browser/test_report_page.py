@@ -233,3 +233,10 @@ def test_it_prints_with_tables_unfolded(opened: Opened) -> None:
     page.emulate_media(media="print")
     assert page.locator("table").last.is_visible() and not page.locator("#slider").is_visible()
     assert len(page.pdf()) > 10_000
+    page.set_viewport_size({"width": 700, "height": 1000})  # A4 between its margins
+    page.evaluate("document.querySelector('table td:last-child').textContent = 'f'.repeat(400)")
+    assert page.evaluate("document.documentElement.scrollWidth") <= 700, "a long word does not leave the sheet"
+    fit = "getComputedStyle(document.querySelector('.stage canvas')).objectFit"
+    assert page.evaluate(fit) == "contain", "the sheet has another shape than the window, and the picture keeps its own"
+    beyond = "(() => { const one = document.querySelector('.thumbs'); return one.scrollWidth - one.clientWidth })()"
+    assert page.evaluate(beyond) <= 0, "all thumbnails are on the sheet"
