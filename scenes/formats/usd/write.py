@@ -173,6 +173,8 @@ class UsdWriter:
         elif isinstance(shape, Cube) and not textured:
             made = UsdGeom.Cube.Define(self.stage, path)
             made.CreateSizeAttr(2.0)
+        elif isinstance(shape, Curves) and not textured:
+            made = self._curves(shape, path, name)
         else:
             if isinstance(shape, Disk | Sphere | Curves):
                 became = f"a mesh of {len(as_mesh(shape).faces)} triangles"
@@ -188,6 +190,27 @@ class UsdWriter:
         UsdShade.MaterialBindingAPI.Apply(made.GetPrim()).Bind(material)
         if shines(instance):
             self._shine(made.GetPrim())
+
+    def _curves(self, curves: Curves, path: str, name: str) -> Any:
+        """Curves with their widths; those without normals are round in USD."""
+        if curves.kind in ("flat", "cylinder"):
+            self.report.add(name, f"curves of the kind {curves.kind!r}, which face the viewer", "round curves")
+        made = UsdGeom.BasisCurves.Define(self.stage, path)
+        made.CreateTypeAttr("linear" if curves.basis == "linear" else "cubic")
+        if curves.basis != "linear":
+            made.CreateBasisAttr(curves.basis)
+        made.CreateWrapAttr("nonperiodic")
+        made.CreateCurveVertexCountsAttr(Vt.IntArray.FromNumpy(np.ascontiguousarray(curves.counts, np.int32)))
+        made.CreatePointsAttr(self.document.vectors(curves.points, f"points of {path}"))
+        made.CreateWidthsAttr(Vt.FloatArray.FromNumpy(np.ascontiguousarray(curves.widths, np.float32)))
+        made.SetWidthsInterpolation("vertex")
+        wide = 0.5 * float(curves.widths.max())
+        ends = np.stack([curves.points.min(axis=0) - wide, curves.points.max(axis=0) + wide])
+        made.CreateExtentAttr(self.document.vectors(ends, f"extent of {path}"))
+        if curves.normals is not None:
+            made.CreateNormalsAttr(self.document.vectors(curves.normals, f"normals of {path}"))
+            made.SetNormalsInterpolation("varying")
+        return made
 
     def _shine(self, prim: Any) -> None:
         """Makes a light of a shape whose material shines."""
