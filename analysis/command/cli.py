@@ -25,6 +25,7 @@ Options = TypeVar("Options")
 EXIT_BAD_INPUT = 2
 EXIT_BROKEN = 3
 EXIT_INTERRUPTED = 130
+EXIT_UNREAD = 141  # 128 + SIGPIPE, as shells report it
 
 _SPINNING = ("GOMP_SPINCOUNT", "OMP_WAIT_POLICY")
 _SPINS = "1000"  # no difference was measured from 300 to 3000 cycles
@@ -119,7 +120,7 @@ def parse(options: type[Options], description: str, arguments: list[str] | None 
         with contextlib.redirect_stderr(caught), bad_input():
             return tyro.cli(shown, description=_as_called(description), args=given)
     except InputError as error:
-        raise InputError(as_typed(str(error), given)) from None
+        raise InputError(as_typed(str(error), given)) from error.__cause__
     except SystemExit as stop:
         if not stop.code:
             raise
@@ -153,7 +154,8 @@ def run_cli(main: Callable[[], None]) -> None:
     """Runs a script's main function and ends the process.
 
     Bad input, and a package that is missing or of an unsupported version, end with one line on standard
-    error and status 2, broken invariants with one line and status 3, Ctrl-C with one line and status 130.
+    error and status 2, broken invariants with one line and status 3, Ctrl-C with one line and status 130. Where nothing
+    reads standard output any more, as after ``| head``, the process ends without a line and with status 141.
     """
     _spin_briefly()
     _encodable()
@@ -161,7 +163,10 @@ def run_cli(main: Callable[[], None]) -> None:
     try:
         with heeded():
             main()
-    except InputError as error:
+    except (InputError, BrokenPipeError) as error:
+        if any(isinstance(cause, BrokenPipeError) for cause in _with_causes(error)):
+            os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())  # nothing reads what is left
+            sys.exit(EXIT_UNREAD)
         _end(error, EXIT_BAD_INPUT)
     except BrokenInvariants as error:
         _end(error, EXIT_BROKEN)

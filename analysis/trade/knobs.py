@@ -59,6 +59,7 @@ _SWITCHES = {
     "shadows": "change expected where shadows move",
     "spread": "change expected beside what changed",
     "probes": "tiles that look where nothing is expected",
+    "noise": "noise of random samples told from detail",
 }
 _NUMBERS: dict[str, tuple[str, tuple[Value, ...]]] = {
     "share_max": ("longest cycle, as a share of the pixels that it samples", (1 / 128, 1 / 64, 1 / 16, 1 / 8)),

@@ -138,6 +138,13 @@ def test_run_cli_ends_with_one_line(error, status: int, line: str | None, capsys
     assert printed.err.count("\n") == 1 and (printed.err == line or (line is None and "interrupted" in printed.err))
 
 
+def test_a_reader_that_leaves_early_ends_the_command_without_a_line() -> None:
+    root = Path(__file__).parents[3]
+    command = f"{sys.executable} scripts/run.py --help | head -c 1; exit ${{PIPESTATUS[0]}}"
+    done = subprocess.run(["bash", "-c", command], cwd=root, capture_output=True, text=True)
+    assert (done.returncode, done.stdout, done.stderr) == (141, "u", "")
+
+
 def test_run_cli_hides_neither_success_nor_faults_of_the_program() -> None:
     done = []
     run_cli(lambda: done.append(1))
