@@ -40,7 +40,7 @@ class _Segments:
         else:
             self.number = (counts + 2 * self.pinned - width) // step + 1
             self.whole = bool(((counts + 2 * self.pinned - width) % step == 0).all())
-        self.whole &= len(counts) > 0 and bool((counts >= 2).all() and (self.number >= 1).all())
+        self.whole &= len(counts) > 0 and bool((self.number >= 1).all())
         self.of = np.repeat(np.arange(len(counts)), np.maximum(self.number, 0))
         self.begins = np.cumsum(counts) - counts
         first = np.cumsum(self.number) - self.number
@@ -81,8 +81,9 @@ def curves_of(prim: Any, code: Any, where: str, report: LossReport) -> Mesh | No
     basis = "linear" if str(curves.GetTypeAttr().Get()) == "linear" else basis
     points = finite(array_of(curves.GetPointsAttr().Get(code), 3), f"{where}: points")
     counts = array_of(curves.GetCurveVertexCountsAttr().Get(code), 0).astype(np.int64)
-    segments = _Segments(counts, basis, wrap) if basis in _BASES else None
-    if segments is None or not segments.whole or counts.sum() != len(points):
+    fit = basis in _BASES and bool((counts >= 2).all()) and counts.sum() == len(points)
+    segments = _Segments(counts, basis, wrap) if fit else None  # as large as the counts say
+    if segments is None or not segments.whole:
         report.add(where, f"curves ({basis}, {wrap}) whose numbers do not fit")
         return None
     if curves.GetPointsAttr().GetNumTimeSamples() > 1:

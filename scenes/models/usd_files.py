@@ -43,7 +43,8 @@ from scenes.models.usd_views import LAMP, camera_of, glow_of, light_of
 _GREY = 0.18
 _ADDRESS = re.compile(r"anon:0x[0-9a-fA-F]+:?")
 _NESTED = re.compile(
-    rb'"""(?s:.*?)"""|"(?:\\.|[^"\\\n])*"|\'(?:\\.|[^\'\\\n])*\'|#[^\n]*|@[^@\n]*@|[=:]\s*\[[\s\d.,()eE+-]*(\[)'
+    rb'"""(?s:.*?)"""|"(?:\\.|[^"\\\n])*"|\'(?:\\.|[^\'\\\n])*\'|#[^\n]*|@[^@\n]*@'
+    rb"|[=:]\s*\[(?:[\s\d.,()einfaE+-]|#[^\n]*)*(\[)"
 )
 """Strings, comments and files of USD text, and numbers in which a further list begins."""
 

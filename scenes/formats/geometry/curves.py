@@ -23,6 +23,9 @@ STRAIGHT = 0.05
 
 _STEPS_MAX = 32  # chords of a segment
 
+TRIANGLES_MOST = 1 << 22
+"""Triangles of tubes that are not exceeded for the sake of :data:`STRAIGHT`."""
+
 TO_BEZIER = np.array([[1.0, 4.0, 1.0, 0.0], [0.0, 4.0, 2.0, 0.0], [0.0, 2.0, 4.0, 0.0], [0.0, 1.0, 4.0, 1.0]]) / 6.0
 """Control points of a Bézier curve from four of a uniform cubic B-spline."""
 _TO_BSPLINE = np.array([[6.0, -7.0, 2.0, 0.0], [0.0, 2.0, -1.0, 0.0], [0.0, -1.0, 2.0, 0.0], [0.0, 2.0, -7.0, 6.0]])
@@ -131,12 +134,14 @@ def _whole(shapes: Sequence[object]) -> Curves:
 @lru_cache(maxsize=64)
 def curve_mesh(curves: Curves) -> Mesh:
     """Curves as triangles: tubes as prisms of :data:`SIDES` sides, ribbons as strips; chords are within
-    :data:`STRAIGHT` of the curves. Ribbons that face the viewer are tubes."""
+    :data:`STRAIGHT` of the curves, or fewer for more than :data:`TRIANGLES_MOST`. Ribbons that face the viewer are
+    tubes."""
     segments, of = bezier_segments(curves)
     second = np.abs(np.diff(segments[..., :3], 2, axis=1)).max()
     least = max(float(curves.widths.max()), 1e-12)
     # a chord is within max |B''| / 8 of the curve, and |B''| is at most 6 times the second difference
-    steps = int(np.clip(np.ceil(np.sqrt(6.0 * second / (8.0 * STRAIGHT * least))), 1, _STEPS_MAX))
+    wanted = np.ceil(np.sqrt(6.0 * second / (8.0 * STRAIGHT * least)))
+    steps = int(np.clip(wanted, 1, min(_STEPS_MAX, max(1, TRIANGLES_MOST // (2 * SIDES * len(of))))))
     if curves.basis == "linear":
         steps = 1
     t = np.arange(steps + 1) / steps

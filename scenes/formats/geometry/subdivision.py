@@ -23,6 +23,10 @@ LEVELS = 3
 """Levels to which a surface is refined."""
 POLYGONS_MOST = 1 << 20
 """Greatest number of polygons of a refined surface; a larger cage gets fewer levels."""
+PAIRS_MOST = 1 << 22
+"""Greatest number of pairs of corners of a polygon of more than 16, and of polygons at a point of more than 16, times
+four for each level after the first. Each point near these depends on all of their points: a cage with more pairs gets
+fewer levels."""
 SHARP_ALWAYS = 10.0
 """Sharpness that never ends, as in OpenSubdiv."""
 
@@ -79,7 +83,9 @@ class Refined:
 def levels_of(cage: Cage, scheme: Scheme) -> int:
     """Number of levels to which a cage is refined."""
     first = len(cage.indices) if scheme == "catmullClark" else 4 * len(cage.counts)
-    return next((level for level in range(LEVELS, 0, -1) if first * 4 ** (level - 1) <= POLYGONS_MOST), 0)
+    sizes = np.concatenate([cage.counts, np.bincount(cage.indices)])
+    share = max(first / POLYGONS_MOST, int((sizes[sizes > 16] ** 2).sum()) / PAIRS_MOST)
+    return next((level for level in range(LEVELS, 0, -1) if share * 4 ** (level - 1) <= 1.0), 0)
 
 
 def refined(cage: Cage, scheme: Scheme, sharp_corners: bool = True) -> Refined:

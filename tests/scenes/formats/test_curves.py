@@ -215,6 +215,16 @@ def test_a_straight_tube_is_a_prism() -> None:
     assert ((normals[:, 1:] * middle[:, 1:]).sum(axis=1) > 0.0).all()  # faces outwards
 
 
+def test_many_curves_have_longer_chords(monkeypatch: pytest.MonkeyPatch) -> None:
+    """100,000 segments would else be 77 million triangles, for the sake of the one that bends most."""
+    curves = some("bspline", 8)
+    finest = len(as_mesh(curves).faces)
+    monkeypatch.setattr("scenes.formats.geometry.curves.TRIANGLES_MOST", finest // 2)
+    assert finest // 4 < len(as_mesh(dataclasses.replace(curves)).faces) <= finest // 2
+    monkeypatch.setattr("scenes.formats.geometry.curves.TRIANGLES_MOST", 1)
+    assert len(as_mesh(dataclasses.replace(curves)).faces) == 5 * 2 * SIDES
+
+
 def test_a_ribbon_is_a_strip_across_its_normals() -> None:
     points = np.array([[0, 0, 0], [1, 0, 0], [2, 0, 0], [3, 0, 0]], np.float32)
     up = np.array([[0, 0, 1], [0, 0, 1]], np.float32)

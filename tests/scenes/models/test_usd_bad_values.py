@@ -47,8 +47,8 @@ def test_messages_of_the_library_do_not_quote_the_file(wrong: str, tmp_path: Pat
 
 def test_lists_within_lists_are_refused_before_the_library_quotes_the_file_at_each_number(tmp_path: Path) -> None:
     """1 GB for a file of 0.6 MB."""
-    for inside in ("1, [", "[", "(0, 1), 2e-3, ["):
-        with pytest.raises(SceneError, match="10:.*: expected numbers, got a list within a list"):
+    for inside in ("1, [", "[", "(0, 1), 2e-3, [", "1, -inf, nan, [", "1, # one\n["):
+        with pytest.raises(SceneError, match="1[01]:.*: expected numbers, got a list within a list"):
             read_whole(written(tmp_path, f'def Mesh "m" {{\n int[] a = [{inside} 0, 1]\n}}'))
     quoted = 'string doc = "= [1, [" # = [[\n string more = """= [1,\n [" """\n'
     read_whole(written(tmp_path, mesh(quoted)))

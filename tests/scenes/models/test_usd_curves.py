@@ -84,6 +84,7 @@ def test_curves_with_normals_are_ribbons(tmp_path: Path) -> None:
         (curves("(0,0,0), (1,0,0), (2,0,0)", "[3]", "bezier"), "whose numbers do not fit"),
         (curves("(0,0,0), (1,0,0)", "[3]", "linear"), "whose numbers do not fit"),
         (curves("(0,0,0)", "[1]", "linear", "periodic"), "whose numbers do not fit"),
+        (curves("(0,0,0), (1,0,0)", "[2147483647, 2147483647]", "linear"), "whose numbers do not fit"),  # 64 GB
         (curves("(0,0,0), (1,0,0)", "[2]", "linear", more="float[] widths = [1, 2, 3]"), "whose number does not fit"),
         (curves("(0,0,0), (1,0,0)", "[2]", "linear", more="bool unused = 1"), "curves without widths"),
     ],

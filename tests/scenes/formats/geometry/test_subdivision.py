@@ -106,5 +106,12 @@ def test_large_cages_get_fewer_levels() -> None:
     few = cage(QUADS)
     many = dataclasses.replace(few, counts=np.full(300_000, 4), indices=np.zeros(1_200_000, np.int64))
     assert levels_of(few, "catmullClark") == 3 and levels_of(many, "catmullClark") == 0
-    some = dataclasses.replace(few, counts=np.full(60_000, 4), indices=np.zeros(240_000, np.int64))
+    some = dataclasses.replace(few, counts=np.full(60_000, 4), indices=np.arange(240_000))
     assert levels_of(some, "catmullClark") == 2
+
+
+def test_polygons_of_many_corners_and_points_of_many_polygons_get_fewer_levels() -> None:
+    """Each point beside them depends on all of their points: 2,000 corners took 4 GB."""
+    for many, levels in ((400, 3), (1000, 2), (2000, 1), (4000, 0)):
+        fan = np.stack([np.arange(many), (np.arange(many) + 1) % many, np.full(many, many)], axis=1)
+        assert (levels_of(cage(np.arange(many)[None]), "catmullClark"), levels_of(cage(fan), "loop")) == (levels,) * 2
