@@ -9,6 +9,7 @@ import importlib.util
 import io
 import os
 import re
+import select
 import sys
 import threading
 import warnings
@@ -163,10 +164,14 @@ def run_cli(main: Callable[[], None]) -> None:
     try:
         with heeded():
             main()
+            if sys.stdout is not None:  # it is None where the shell has closed it
+                sys.stdout.flush()
     except (InputError, BrokenPipeError) as error:
-        if any(isinstance(cause, BrokenPipeError) for cause in _with_causes(error)):
+        if any(isinstance(cause, BrokenPipeError) for cause in _with_causes(error)) and _unread():
             os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())  # nothing reads what is left
             sys.exit(EXIT_UNREAD)
+        if isinstance(error, BrokenPipeError):
+            raise
         _end(error, EXIT_BAD_INPUT)
     except BrokenInvariants as error:
         _end(error, EXIT_BROKEN)
@@ -207,8 +212,9 @@ def run_process(main: Callable[[], None]) -> None:
     if not code:
         threading._shutdown()  # type: ignore[attr-defined]  # waits for threads, as at any end
     atexit._run_exitfuncs()
-    sys.stdout.flush()
-    sys.stderr.flush()
+    for stream in filter(None, (sys.stdout, sys.stderr)):
+        with contextlib.suppress(BrokenPipeError):
+            stream.flush()
     os._exit(code or 0)
 
 
@@ -232,6 +238,15 @@ def _one_warning(message: Warning | str, *_: object) -> None:
     """Prints a warning in one line, without its location in the code."""
     text = re.sub(r"\s+", " ", str(message)).strip()
     print(f"warning: {text}", file=sys.stderr)
+
+
+def _unread() -> bool:
+    """Whether nothing reads standard output any more; assumed where the system has no poll, as on Windows."""
+    if sys.stdout is None or not hasattr(select, "poll"):
+        return sys.stdout is not None
+    poll = select.poll()
+    poll.register(sys.stdout.fileno(), 0)  # errors are told unasked
+    return bool(poll.poll(0))
 
 
 def _encodable() -> None:

@@ -92,8 +92,9 @@ class Surfel(Filter):
         x, y = ((of[:, None] * across + part).reshape(-1) * width for of, part in ((column, part_x), (row, part_y)))
         return replace(state, densities=made.densities, history=made.due.history), (x, y, width / TILE_SIDE)
 
-    def _displayed(self, state: State, moment: Moment) -> State:
-        later = state.estimates.later(state.rate, moment.cycle_s)
+    def _displayed(self, state: State, moment: Moment, color: Float[Tensor, "3 h w"] | None = None) -> State:
+        estimates = state.estimates if color is None else replace(state.estimates, color=color)
+        later = estimates.later(state.rate, moment.cycle_s)
         depth = torch.ones_like(later.time_s) if state.view is None else splats.depths(state.surfels, state.view)
         shown, remaining = splats.drawn(later, state.surfels, depth)
         return replace(state, shown=shown, remaining=remaining)

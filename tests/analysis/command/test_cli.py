@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import errno
 import os
 import subprocess
@@ -138,11 +139,38 @@ def test_run_cli_ends_with_one_line(error, status: int, line: str | None, capsys
     assert printed.err.count("\n") == 1 and (printed.err == line or (line is None and "interrupted" in printed.err))
 
 
+def ended(*arguments: str, read: bool = True) -> tuple[int, str]:
+    """Status and standard error of a Python process. Its output waits in memory, as usual in pipes; without ``read``
+    the reader has left."""
+    environment = {name: value for name, value in os.environ.items() if name != "PYTHONUNBUFFERED"}
+    reader, writer = os.pipe()
+    with contextlib.ExitStack() as held:
+        held.callback(os.close, writer)
+        held.callback(os.close, reader) if read else os.close(reader)
+        command, root = [sys.executable, *arguments], Path(__file__).parents[3]
+        done = subprocess.run(command, cwd=root, env=environment, stdout=writer, stderr=subprocess.PIPE, text=True)
+    return done.returncode, done.stderr
+
+
+def doing(action: str) -> tuple[str, str]:
+    program = "from analysis.command.cli import InputError, run_process\n"
+    return "-c", f"{program}def main():\n    {action}\nrun_process(main)"
+
+
 def test_a_reader_that_leaves_early_ends_the_command_without_a_line() -> None:
-    root = Path(__file__).parents[3]
-    command = f"{sys.executable} scripts/run.py --help | head -c 1; exit ${{PIPESTATUS[0]}}"
-    done = subprocess.run(["bash", "-c", command], cwd=root, capture_output=True, text=True)
-    assert (done.returncode, done.stdout, done.stderr) == (141, "u", "")
+    assert ended("scripts/run.py", "--help", read=False) == (141, "")
+    assert ended(*doing("print(1)"), read=False) == (141, "")
+    assert ended(*doing("print(1); raise InputError('bad')"), read=False) == (2, "error: bad\n")
+
+
+def test_another_pipe_that_breaks_is_no_reader_that_left() -> None:
+    action = "import socket; ends = socket.socketpair(); ends[1].close(); print(1); ends[0].send(b'x')"
+    status, line = ended(*doing(action))
+    assert status == 1 and line.endswith("BrokenPipeError: [Errno 32] Broken pipe\n")
+
+
+def test_no_standard_output_is_no_fault() -> None:
+    assert ended(*doing("import sys; sys.stdout = None; print(1)")) == (0, "")
 
 
 def test_run_cli_hides_neither_success_nor_faults_of_the_program() -> None:

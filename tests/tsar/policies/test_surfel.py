@@ -78,3 +78,14 @@ def test_a_plane_is_resampled_to_the_field(wide: int) -> None:
         first = plane[0, y * wide // side : max((y + 1) * wide // side, y * wide // side + 1)]
         cells = first[:, x * wide // side : max((x + 1) * wide // side, x * wide // side + 1)]
         assert float(found[number]) == pytest.approx(float(cells.mean()), rel=1e-5)
+
+
+def test_what_is_shown_of_another_picture_is_blended_alike() -> None:
+    """A picture of one colour stays that, and the picture of the estimates is what is shown."""
+    policy, state = made(0.01, 0.01)
+    carried = policy.image(state, NOW).carried
+    assert carried is not None
+    plain, color = torch.full((64, 64, 3), 0.25), torch.rand(3, 64, 64, generator=torch.Generator().manual_seed(1))
+    assert torch.allclose(carried(plain), plain, atol=1e-5)
+    drawn = policy._displayed(replace(state, estimates=replace(state.estimates, color=color)), NOW)
+    assert torch.equal(carried(color.permute(1, 2, 0)), policy.image(drawn, NOW).image)
