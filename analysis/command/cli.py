@@ -164,8 +164,7 @@ def run_cli(main: Callable[[], None]) -> None:
     try:
         with heeded():
             main()
-            if sys.stdout is not None:  # it is None where the shell has closed it
-                sys.stdout.flush()
+            _written()
     except (InputError, BrokenPipeError) as error:
         if any(isinstance(cause, BrokenPipeError) for cause in _with_causes(error)) and _unread():
             os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())  # nothing reads what is left
@@ -238,6 +237,12 @@ def _one_warning(message: Warning | str, *_: object) -> None:
     """Prints a warning in one line, without its location in the code."""
     text = re.sub(r"\s+", " ", str(message)).strip()
     print(f"warning: {text}", file=sys.stderr)
+
+
+def _written() -> None:
+    """Writes what waits in standard output, which is None where the shell has closed it."""
+    if sys.stdout is not None:
+        sys.stdout.flush()
 
 
 def _unread() -> bool:

@@ -32,7 +32,7 @@ def read_summary(folder: Path) -> dict[str, Any]:
     """
     try:
         summary = json.loads((folder / SUMMARY).read_bytes())
-    except (OSError, ValueError):
+    except (OSError, ValueError, RecursionError):
         raise ValueError(f"{folder}: expected the folder of a finished run, found no {SUMMARY} to read") from None
     known = {"policy": str, "rivals": list, "mse": dict, "reference_time_s": list, "config": dict, "provenance": dict}
     given = summary if isinstance(summary, dict) else {}

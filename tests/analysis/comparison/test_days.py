@@ -74,6 +74,9 @@ def test_what_cannot_be_read_is_said(tmp_path: Path) -> None:
     (bare / "summary.json").write_text("{}")
     with pytest.raises(ValueError, match=r"bare: expected the summary.json of a comparison, found none of policy"):
         finished_runs([bare])
+    (bare / "summary.json").write_text("[" * 100_000)
+    with pytest.raises(ValueError, match=r"bare: expected the folder of a finished run, found no summary.json"):
+        finished_runs([bare])
     shutil.rmtree(bare)
     with pytest.raises(ValueError, match=r"bare: expected the folder of a finished run, found no summary.json"):
         finished_runs([bare])
