@@ -45,7 +45,7 @@ SUBJECTS = {
     " jod_span_s before_s tolerance draws",
     "repetition": "seed repetitions bootstraps experiments study",
     "observer": "jnds sigmas lapses spreads observers answers guess_rate threshold disturbed",
-    "check": "markers matrix mutations plain formats",
+    "check": "markers matrix groups mutations plain formats",
     "page": "host port bench bench_seconds",
     "machine": "device isa threads workers workers_least scheduler memory_limit_gib retries worker_wait_s log_level"
     " chunk_tiles",
