@@ -14,7 +14,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from scenes.canonical import ConstantTexture, Glass, Material, Medium, Rgb
+from scenes.canonical import ConstantTexture, Glass, Material, Medium, Rgb, SceneError
 from scenes.formats.appearance.folding import mean_of
 from scenes.formats.appearance.media import filled, made_medium
 from scenes.formats.appearance.spectra import grey
@@ -86,7 +86,10 @@ class LuxMediaReader(SceneReader):
                 where, f"scattering by Schlick's phase function with a g of {made.g:g}", "by Henyey and Greenstein"
             )
         self._scatters |= made.scatters
-        volume = _Volume(made.absorption, made.scattering, made.g, self._index(parameters))
+        index = self._index(parameters)
+        if not index > 0.0:
+            raise SceneError(f"{where}: fresnel: expected a positive index, got {index:g}")
+        volume = _Volume(made.absorption, made.scattering, made.g, index)
         self.names.define(self.volumes, name, volume)
         self.left_over(parameters, f"volume {name!r}")
 

@@ -272,8 +272,8 @@ class LuxReader(LuxMediaReader):
         self.left_over(parameters, "area light")
 
     def _keep(self, instance: Instance, directive: Directive) -> None:
-        """Keeps a shape; lamps and media have their outside where its placed faces are counter-clockwise."""
-        if has_outside(instance) and determinant(instance.to_world) < 0.0:
+        """Keeps a shape; lamps and media have their outside where the faces of the file are counter-clockwise."""
+        if has_outside(instance) and determinant(self.transforms.current[0]) < 0.0:
             instance = turned_over(instance)
         super()._keep(instance, directive)
 

@@ -16,6 +16,7 @@ from scenes.canonical import Curves, SceneError
 from scenes.canonical.values import Matrix
 from scenes.formats.geometry.orientation import scales_evenly
 from scenes.formats.mitsuba.properties import Properties
+from scenes.formats.text.numbers import NUMBER_MAX
 from scenes.formats.text.scene_files import SceneFiles
 
 _BINARY = b"BINARY_HAIR"
@@ -54,8 +55,8 @@ def read_curves(content: bytes, where: str, basis: str, radius: float | None = N
     if not len(kept) or kept.min() < least:
         raise SceneError(f"{where}: expected curves of at least {least} points, separated by empty lines")
     radii = found[:, 3] if radius is None else np.full(len(found), radius)
-    if not np.isfinite(found).all() or radii.min() < 0.0:
-        raise SceneError(f"{where}: expected finite points and radii of at least 0")
+    if not np.abs(found).max() <= NUMBER_MAX or not 0.0 <= radii.min() <= radii.max() <= NUMBER_MAX:
+        raise SceneError(f"{where}: expected points within 1e30 and radii from 0 to 1e30")
     points, widths = found[:, :3].astype(np.float32), (2.0 * radii).astype(np.float32)
     return Curves(points, widths, kept, basis, source=where)  # type: ignore[arg-type]
 

@@ -181,7 +181,8 @@ def test_curves_come_back_from_mitsuba_3(basis: str, tmp_path: Path) -> None:
     assert first == pytest.approx(1.5 * float(scene.instances[0].shape.widths[0]), rel=1e-6)  # type: ignore[union-attr]
 
 
-@pytest.mark.parametrize("content", ["", "0 0 0 1\n1 0 0 1\n", "0 0 0\n" * 4, "0 0 0 x\n" * 4, "0 0 0 -1\n" * 4])
+@pytest.mark.parametrize("content", ["", "0 0 0 1\n1 0 0 1\n", "0 0 0\n" * 4, "0 0 0 x\n" * 4, "0 0 0 -1\n" * 4,
+                                     "1e39 0 0 1\n" * 4, "0 0 0 1e39\n" * 4])  # fmt: skip
 def test_impossible_files_of_curves_are_one_line(content: str, tmp_path: Path) -> None:
     (tmp_path / "c.txt").write_text(content)
     shape = '<shape type="bsplinecurve"><string name="filename" value="c.txt"/></shape>'
