@@ -89,7 +89,7 @@ np.save(out, np.array(mi.render(scene, spp=samples, seed=seed))[..., :3])
 # LuxCore's pictures begin with the bottom row, and are one row too low: it takes the ray of row y from
 # height - y - 1, not from height - y. The missing row at the bottom repeats the row above it. LuxCore 2.10 knows
 # scattering volumes of these files by another spelling than LuxRender, which it then refuses itself, and once scattered
-# light alone.
+# light alone. File names of LuxCore's own scenes are relative to a folder above theirs.
 _LUXCORE = """
 import os, sys, time, numpy as np
 import pyluxcore as lux  # after NumPy: its allocator stops a later import
@@ -103,7 +103,15 @@ if kinds[0] in text:
     with open(out + ".lxs", "w", encoding="utf-8") as copy:
         copy.write(text.replace(*kinds))
 how, what = lux.Properties(), lux.Properties()
-lux.ParseLXS(out + ".lxs" if kinds[0] in text else os.path.basename(file), how, what)
+if file.endswith((".cfg", ".scn")):
+    (how if file.endswith(".cfg") else what).SetFromFile(os.path.basename(file))
+    if how.IsDefined("scene.file"):
+        while not os.path.exists(how.Get("scene.file").GetString()) and os.getcwd() != "/":
+            os.chdir("..")
+        what.SetFromFile(how.Get("scene.file").GetString())
+        how.Delete("scene.file")
+else:
+    lux.ParseLXS(out + ".lxs" if kinds[0] in text else os.path.basename(file), how, what)
 for name in list(what.GetAllNames()):
     if name.startswith("scene.volumes.") and what.Get(name).GetString() == "homogenous":
         what.Set(lux.Property(name, "homogeneous"))

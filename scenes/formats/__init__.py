@@ -21,6 +21,7 @@ FORMATS: Named[Format] = Named(
         "pbrt4": "scenes.formats.pbrt.declared:PBRT_4",
         "luxrender": "scenes.formats.luxrender.declared:LUXRENDER",
         "luxrender-parts": "scenes.formats.luxrender.declared:LUXRENDER_PARTS",
+        "luxcore": "scenes.formats.luxcore.declared:LUXCORE",
         "mitsuba": "scenes.formats.mitsuba.declared:MITSUBA",
         "mitsuba3": "scenes.formats.mitsuba.declared:MITSUBA_3",
         "mitsuba-dictionary": "scenes.formats.mitsuba.declared:MITSUBA_DICTIONARY",

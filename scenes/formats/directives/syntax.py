@@ -235,12 +235,12 @@ def _values(token: Token, file: Path) -> Values:
         cut = start + _PIECE
         while cut < end and body[cut] not in " \t\r\n,":
             cut += 1
-        pieces.append(_parsed(body[start : min(cut, end)], place))
+        pieces.append(parsed_numbers(body[start : min(cut, end)], place))
         start = cut
     return pieces[0] if len(pieces) == 1 else np.concatenate(pieces) if pieces else np.zeros(0)
 
 
-def _parsed(text: str, place: TextPosition) -> NDArray[np.float64]:
+def parsed_numbers(text: str, place: TextPosition) -> NDArray[np.float64]:
     """Numbers separated by blanks and commas."""
     text = text.replace(",", " ")
     if not text or text.isspace():
