@@ -49,7 +49,13 @@ ROOMS: dict[str, tuple[str, ...]] = {
         f"scenes/formats/{dialect}": ("scenes.canonical", *SHARED, "scenes.formats.directives", *BESIDE)
         for dialect in DIALECTS
     },
-    "scenes/formats/luxcore": ("scenes.canonical", *SHARED, "scenes.formats.directives", "scenes.formats.luxrender", *BESIDE),
+    "scenes/formats/luxcore": (
+        "scenes.canonical",
+        *SHARED,
+        "scenes.formats.directives",
+        "scenes.formats.luxrender",
+        *BESIDE,
+    ),
     "scenes": ("scenes", "tsar.named"),
     "analysis/command": RECORDS,
     "analysis/storage": ("analysis.command", *RECORDS),

@@ -24,8 +24,10 @@ NAMES = {
 }  # fmt: skip
 """Names of parameters that differ in LuxRender."""
 
-TEXTS = frozenset("type file filter wrap material1 material2 base frontmaterial backmaterial fresnel name mapfile iesfile "
-                  "mapping.type channel colorspace colorspace.config shape".split())  # fmt: skip
+TEXTS = frozenset(
+    "type file filter wrap material1 material2 base frontmaterial backmaterial fresnel name mapfile iesfile "
+    "mapping.type channel colorspace colorspace.config shape".split()
+)
 """Properties that are words."""
 
 _SCALARS = frozenset("uroughness vroughness sigma amount index cauchyb d gamma temperature".split())

@@ -9,6 +9,7 @@ from collections.abc import Container, Mapping
 
 import numpy as np
 
+from scenes.arithmetic import product
 from scenes.canonical import Texture
 from scenes.formats.appearance.folding import mean_of
 from scenes.formats.directives.names import Names
@@ -113,4 +114,5 @@ def _color(found: Property | None, textures: Mapping[str, Texture]) -> tuple[flo
 
 def _number(found: Property, textures: Mapping[str, Texture]) -> float:
     """A number, or the luminance of a colour."""
-    return float(LUMINANCE @ np.array(_color(found, textures)) / LUMINANCE.sum())
+    color = _color(found, textures)
+    return color[0] if len(set(color)) == 1 else float(product(LUMINANCE, color))

@@ -3,7 +3,7 @@
 LuxCore's parser of LuxRender 1.x files translates them to these properties. The reader goes the other way: each part
 becomes the directive of LuxRender from which LuxCore makes it, so that both formats share their meaning.
 
-Source: LuxCore SDK reference manual (wiki of LuxCoreRender); properties, defaults and order as in LuxCore 2.10, in which
+Source: LuxCore SDK reference manual (wiki of LuxCoreRender); properties, defaults and order as in LuxCore 2.10, where
 textures, materials and volumes can be named by later ones only.
 """
 
@@ -16,7 +16,7 @@ from pathlib import Path
 import numpy as np
 
 from scenes.arithmetic import product
-from scenes.canonical import Mesh, Scene, SceneError
+from scenes.canonical import ConstantTexture, Medium, Mesh, Rgb, Scene, SceneError
 from scenes.canonical.values import Matrix
 from scenes.formats.appearance.folding import mean_of
 from scenes.formats.appearance.spectra import grey, rgb
@@ -27,10 +27,10 @@ from scenes.formats.losses import LossReport
 from scenes.formats.luxcore.defaults import drop_meaningless
 from scenes.formats.luxcore.directives import LUMINANCE, directive, numbers, parameters, texts
 from scenes.formats.luxcore.files import LuxCoreFiles
-from scenes.formats.luxcore.lights import light_values
+from scenes.formats.luxcore.lights import color_unit, light_values, lumens_of
 from scenes.formats.luxcore.materials import material_values, texture_values, volume_values
-from scenes.formats.luxcore.surfaces import LuxCoreSurfaces
 from scenes.formats.luxcore.settings import settings
+from scenes.formats.luxcore.surfaces import LuxCoreSurfaces
 from scenes.formats.luxcore.syntax import Block, Property, parsed_properties, parts_of
 from scenes.formats.luxrender.read import LuxReader
 from scenes.formats.text.places import TextPosition
@@ -38,7 +38,7 @@ from scenes.formats.text.places import TextPosition
 _PARTS = ("textures", "volumes", "materials", "shapes", "objects", "lights")
 """Parts of a scene in the order in which they refer to each other."""
 
-_EMISSION = ("", ".gain", ".power", ".efficency", ".efficiency")
+_EMISSION = ("", ".gain", ".power", ".efficency", ".efficiency", ".normalizebycolor")
 _SHAPES = {"ply": "filename", "vertices": "P", "faces": "indices", "normals": "N", "uvs": "uv"}
 
 
@@ -128,7 +128,7 @@ class LuxCoreReader(LuxReader):
             left = block.pop(rest)
             self.report.add(str(left.place), f"property {left.key!r}")
 
-    def _make(self, name: str, words: tuple[str, ...], values: list[Values], place: TextPosition) -> None:
+    def _direct(self, name: str, words: tuple[str, ...], values: list[Values], place: TextPosition) -> None:
         self._do(directive(name, words, values, place, self.beside))
 
     # --- textures, volumes, materials ----------------------------------------------------------------------------
@@ -137,12 +137,12 @@ class LuxCoreReader(LuxReader):
         kind = block.pop("type").word() if "type" in block else "imagemap"
         of, made, values = texture_values(kind, block, self.names.colors, self.report)
         if made == "const":
-            self.names.define(self.names.indices, name, self._index(parameters_of(
+            self.names.define(self.names.indices, name, self._metal_index(parameters_of(
                 directive("Texture", (), values, place, self.beside), 0)))  # fmt: skip
             return
-        self._make("Texture", (name, of, made), values, place)
+        self._direct("Texture", (name, of, made), values, place)
 
-    def _index(self, given: Parameters) -> tuple[tuple[float, float, float], tuple[float, float, float]]:  # type: ignore[override]
+    def _metal_index(self, given: Parameters) -> tuple[Rgb, Rgb]:
         return self.surfaces.color(given, "n", grey(0.5)), self.surfaces.color(given, "k", grey(0.5))
 
     def _volume_block(self, name: str, block: Block, place: TextPosition) -> None:
@@ -150,13 +150,13 @@ class LuxCoreReader(LuxReader):
         several = block.pop("multiscattering", None)
         values = volume_values(kind, block, self.names.colors, self.report)
         before, self._scatters = self._scatters, False
-        self._make("MakeNamedVolume", (name, kind), values, place)
+        self._direct("MakeNamedVolume", (name, kind), values, place)
         single = several is None or several.word() in ("0", "false")
         if self._scatters and single:
             self.report.add(str(place), "a volume that scatters light once", "any number of times")
         self._scatters, self._integrator = before or self._scatters, "multi"
 
-    def _volume_named(self, found: Property | None):  # noqa: ANN202
+    def _volume_named(self, found: Property | None) -> Medium | None:
         if found is None:
             return None
         return self._named(directive("Interior", (found.word(),), [], found.place, self.beside))
@@ -166,11 +166,11 @@ class LuxCoreReader(LuxReader):
         self.borders[name] = {side: block.pop(f"volume.{side}") for side in ("interior", "exterior")
                               if f"volume.{side}" in block}  # fmt: skip
         values = material_values(name, block, self.names, self.report)
-        self._make("MakeNamedMaterial", (name,), values, place)
+        self._direct("MakeNamedMaterial", (name,), values, place)
 
     # --- camera, objects, lights ---------------------------------------------------------------------------------
 
-    def _camera(self, block: Block, around: object, place: TextPosition) -> None:
+    def _camera(self, block: Block, around: Medium | None, place: TextPosition) -> None:
         place = next(iter(block.values())).place if block else place
         drop_meaningless(block, self.report)
         kind = block.pop("type").word() if "type" in block else "perspective"
@@ -180,12 +180,18 @@ class LuxCoreReader(LuxReader):
             ends += block.pop(rest).numbers(3).tolist() if rest in block else default
         self._place(np.eye(4))
         self._do(Directive("LookAt", (np.array(ends, np.float64),), place, self.beside))
+        if kind != "perspective":  # without a meaning
+            block.pop("fieldofview", None)
         values = parameters(block, ())
         for name, rest, value in (("fov", "fieldofview", 45.0), ("focaldistance", "focaldistance", 10.0)):
             values += numbers(name, value) if rest not in block and kind == "perspective" else []
-        self.attributes.exterior = around  # type: ignore[assignment]
-        self._make("Camera", (kind,), values, place)
-        self._make("WorldBegin", (), [], place)
+        if "screenwindow" not in block:  # the longer side is from -1 to 1; in LuxRender the shorter one is
+            size_px = np.array([self.film.width_px, self.film.height_px])
+            wide, high = (size_px / size_px.max()).tolist()
+            values += numbers("screenwindow", -wide, wide, -high, high)
+        self.attributes.exterior = around
+        self._direct("Camera", (kind,), values, place)
+        self._direct("WorldBegin", (), [], place)
 
     def _place(self, matrix: Matrix) -> None:
         self.transforms.replace(matrix)
@@ -228,7 +234,7 @@ class LuxCoreReader(LuxReader):
         values = parameters({**shape, **rest}, (), _SHAPES)
         if kind == "mesh":
             values += [] if "ply" in shape else texts(filename="")
-        self._make("Shape", ({"mesh": "plymesh"}.get(kind, kind),), values, place)
+        self._direct("Shape", ({"mesh": "plymesh"}.get(kind, kind),), values, place)
 
     def _shared_mesh(self, given: Parameters, report: LossReport) -> Mesh:
         """A mesh in the file itself, which its objects share."""
@@ -250,22 +256,21 @@ class LuxCoreReader(LuxReader):
         given = parameters_of(directive("emission", (), values, lamp[""].place, self.beside), 0)
         found = self.surfaces.texture(given, "emission", grey(0.0))
         color = np.array(mean_of(found))
-        if given.types.get("emission") == "texture" and color.tolist() != np.ravel(getattr(found, "value", ())).tolist():
+        if not isinstance(found, ConstantTexture):
             self.report.add(str(lamp[""].place), "a lamp with a texture", "its mean")
         gain = np.broadcast_to(lamp[".gain"].numbers(1, 3), 3) if ".gain" in lamp else np.ones(3)
         if not (color * gain > 0.0).any():
             return
         self.attributes.emission = rgb(color * gain)
-        lumens = float(lamp[".power"].numbers(1)[0]) if ".power" in lamp else 0.0
-        efficacy = lamp.get(".efficency", lamp.get(".efficiency"))
-        lumens *= float(efficacy.numbers(1)[0]) if efficacy is not None else 0.0
-        self.attributes.power = lumens * float(product(LUMINANCE, color * gain) / product(LUMINANCE, color))
+        lumens = lumens_of(dict(lamp), ".")
+        unit = color_unit(lamp.get(".normalizebycolor"), color)
+        self.attributes.power = lumens * float(product(LUMINANCE, color * gain)) / unit
 
     def _light_block(self, name: str, block: Block, place: TextPosition) -> None:
         kind = block.pop("type").word() if "type" in block else "sky2"
         self._place(self._matrix(block, "transformation"))
         kind, values = light_values(kind, block, self.report)
-        self._make("LightSource", (kind,), values, place)
+        self._direct("LightSource", (kind,), values, place)
 
 
 def load_luxcore(path: Path, root: Path | None, report: LossReport) -> Scene:

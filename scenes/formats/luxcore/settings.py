@@ -25,8 +25,8 @@ _REPLACED = ("MITCHELL_SS", "CATMULLROM", "BLACKMANHARRIS")
 _DEPTH, _WIDTH_PX, _HEIGHT_PX = 6, 640, 480
 
 _SAME_PICTURE = tuple(
-    "film. renderengine. sampler. batch. periodicsave. opencl. cuda. context. native. accelerator. screen. tile. tilepath. "
-    "rtpath. lightstrategy. path.photongi. path.hybridbackward. path.russianroulette. scene.epsilon. "
+    "film. renderengine. sampler. batch. periodicsave. opencl. cuda. context. native. accelerator. screen. tile. "
+    "tilepath. rtpath. lightstrategy. path.photongi. path.hybridbackward. path.russianroulette. scene.epsilon. "
     "path.albedospecular. light.russianroulette. compile.".split()
 )
 """Beginnings of keys that affect how LuxCore computes and stores its picture."""

@@ -1,6 +1,6 @@
 """Textures and materials of LuxCore that LuxRender 1.x lacks, or has under other names.
 
-Source: LuxCore SDK reference manual (wiki of LuxCoreRender), sections on materials and textures; Burley 2012 (Disney's).
+Source: LuxCore SDK reference manual (wiki of LuxCoreRender), section on materials; Burley 2012 (Disney's).
 """
 
 from __future__ import annotations
@@ -14,7 +14,12 @@ from scenes.formats.directives.surfaces import Maker
 from scenes.formats.directives.syntax import Parameters
 from scenes.formats.luxrender.read_materials import LuxSurfaces
 
-MATERIALS = {"roughmatte": "matte", "archglass": "glass", "glossy2": "glossy", "roughmattetranslucent": "mattetranslucent"}
+MATERIALS = {
+    "roughmatte": "matte",
+    "archglass": "glass",
+    "glossy2": "glossy",
+    "roughmattetranslucent": "mattetranslucent",
+}
 """Kinds of materials with other names in LuxRender."""
 
 TEXTURES = {

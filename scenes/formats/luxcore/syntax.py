@@ -1,7 +1,7 @@
 """The syntax of LuxCore's files: lines of ``key = values``, with keys in parts between dots.
 
-Source: LuxCore SDK reference manual (wiki of LuxCoreRender), section on properties; ``Properties`` of LuxCore 2.10, whose
-comments are whole lines, and in which the last of two equal keys counts.
+Source: LuxCore SDK reference manual (wiki of LuxCoreRender), section on properties; ``Properties`` of LuxCore 2.10:
+comments are whole lines, and the last of two equal keys counts.
 """
 
 from __future__ import annotations
