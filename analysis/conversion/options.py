@@ -23,7 +23,8 @@ class ConvertOptions:
     losses."""
 
     source: Annotated[Path, tyro.conf.Positional]
-    """Scene file: PBRT v3 or v4 (.pbrt), LuxRender 1.x (.lxs), LuxCore (.cfg, .scn), Mitsuba 0.5 to 3 (.xml, .json), or a model."""
+    """Scene file: PBRT v3 or v4 (.pbrt), LuxRender 1.x (.lxs), Mitsuba 0.5 to 3 (.xml, .json), LuxCore (.cfg,
+    .scn), or a model."""
     target: Annotated[Path, tyro.conf.Positional]
     """File to write; meshes and pictures go to the folders models and textures beside it."""
     to: str = ""
