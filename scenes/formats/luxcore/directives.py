@@ -53,6 +53,8 @@ def parameters(block: Block, textures: Container[str], names: Mapping[str, str] 
 
 def _parameter(rest: str, found: Property, textures: Container[str], names: Mapping[str, str]) -> list[Values]:
     name = names.get(rest, rest)
+    if rest == "multibounce":
+        return [(f"bool {name}",), (str(found.word() in ("1", "true")).lower(),)]
     if rest in TEXTS:
         return texts(**{name: found.word()})
     if not found.is_number or (found.text in textures):

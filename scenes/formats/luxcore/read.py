@@ -16,7 +16,7 @@ from pathlib import Path
 import numpy as np
 
 from scenes.arithmetic import product
-from scenes.canonical import ConstantTexture, Medium, Mesh, Rgb, Scene, SceneError
+from scenes.canonical import ConstantTexture, Medium, Mesh, Scene, SceneError
 from scenes.canonical.values import Matrix
 from scenes.formats.appearance.folding import mean_of
 from scenes.formats.appearance.spectra import grey, rgb
@@ -137,13 +137,12 @@ class LuxCoreReader(LuxReader):
         kind = block.pop("type").word() if "type" in block else "imagemap"
         of, made, values = texture_values(kind, block, self.names.colors, self.report)
         if made == "const":
-            self.names.define(self.names.indices, name, self._metal_index(parameters_of(
-                directive("Texture", (), values, place, self.beside), 0)))  # fmt: skip
+            given = parameters_of(directive("Texture", (), values, place, self.beside), 0)
+            index = self.surfaces.color(given, "n", grey(0.5)), self.surfaces.color(given, "k", grey(0.5))
+            self.names.define(self.names.indices, name, index)
+            self.left_over(given, f"texture {name!r}")
             return
         self._direct("Texture", (name, of, made), values, place)
-
-    def _metal_index(self, given: Parameters) -> tuple[Rgb, Rgb]:
-        return self.surfaces.color(given, "n", grey(0.5)), self.surfaces.color(given, "k", grey(0.5))
 
     def _volume_block(self, name: str, block: Block, place: TextPosition) -> None:
         kind = block.pop("type").word() if "type" in block else "homogeneous"

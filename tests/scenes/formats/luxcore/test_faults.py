@@ -10,11 +10,11 @@ from scenes.canonical import SceneError
 from tests.scenes.formats.luxcore.test_read import CAMERA, SQUARE, scene_of
 
 FULL = (
-    CAMERA + "scene.camera.fieldofview = 60\nscene.camera.lensradius = 0.1\nscene.textures.t.type = constfloat3\n"
+    CAMERA + "scene.textures.f.type = fresnelconst\nscene.textures.f.n = 1 2 3\nscene.camera.fieldofview = 60\n"
+    "scene.camera.lensradius = 0.1\nscene.textures.t.type = constfloat3\n"
     "scene.textures.t.value = 0.1 0.2 0.3\nscene.materials.m.type = glossy2\nscene.materials.m.kd = t\n"
-    "scene.materials.m.ks = 0.2\nscene.materials.m.uroughness = 0.2\nscene.materials.m.emission = 1\n"
-    + SQUARE
-    + "scene.objects.o.transformation = 1 0 0 0 0 1 0 0 0 0 1 0 1 2 3 1\n"
+    "scene.materials.m.ks = 0.2\nscene.materials.m.multibounce = 0\nscene.materials.m.uroughness = 0.2\n"
+    "scene.materials.m.emission = 1\n" + SQUARE + "scene.objects.o.transformation = 1 0 0 0 0 1 0 0 0 0 1 0 1 2 3 1\n"
     "scene.lights.l.type = point\nscene.lights.l.gain = 2\nscene.lights.l.position = 1 2 3\n"
 )
 

@@ -204,6 +204,8 @@ def test_materials_that_become_others(tmp_path: Path) -> None:
     found, lost = material_of(tmp_path, "scene.materials.m." + disney.replace("\n", "\nscene.materials.m."))
     assert isinstance(found, MetallicRough) and (found.metallic, found.roughness, found.coat) == (0.2, 0.3, 0.4)
     assert found.ior == pytest.approx(1.5) and lost == ["material 'disney'", "sheen of the material 'disney'"]
+    found, lost = material_of(tmp_path, "scene.materials.m.type = glossy2\nscene.materials.m.multibounce = 1")
+    assert isinstance(found, Glossy) and lost == ["bounces between the facets of the coat (multibounce)"]
     found, lost = material_of(tmp_path, "scene.materials.m.type = velvet\nscene.materials.m.kd = 0.5")
     assert found == Matte(half) and lost == ["material 'velvet'"]
 
