@@ -14,6 +14,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+from scipy.sparse import sparray
 from scipy.spatial.transform import Rotation
 
 Array = NDArray[np.float64]
@@ -94,6 +95,12 @@ def products(*matrices: ArrayLike) -> Any:
     for matrix in matrices[1:]:
         total = product(total, matrix)
     return total
+
+
+def weighted(weights: sparray, values: Any) -> Any:
+    """The product of a sparse matrix and another matrix or sparse matrix. SciPy adds in the order of the entries, one
+    after another."""
+    return weights @ values
 
 
 def determinant(matrix: Array) -> float:

@@ -1,5 +1,7 @@
 """Memory that this process can still allocate, the least of what the machine, its containers and its own limits leave;
-and the cores that it may use. Systems other than Linux report fewer of these limits."""
+and the cores that it may use. Systems other than Linux report fewer of these limits.
+
+psutil is imported when it is asked: a Python without packages must reach the line that says so."""
 
 from __future__ import annotations
 
@@ -7,11 +9,11 @@ import os
 from collections.abc import Iterator
 from pathlib import Path
 
-import psutil
-
 
 def core_count() -> int:
     """Number of CPU cores this process may use; all cores of the machine on macOS, which has no affinity."""
+    import psutil
+
     process = psutil.Process()
     if hasattr(process, "cpu_affinity"):
         return len(process.cpu_affinity() or ())
@@ -24,11 +26,15 @@ def free_memory_bytes(root: Path = Path("/")) -> int:
     Args:
         root: directory that contains the ``proc`` and ``sys`` of control groups.
     """
+    import psutil
+
     return max(0, min([psutil.virtual_memory().available, *_control_groups(root), *_process()]))
 
 
 def _process() -> Iterator[int]:
     """Bytes left by ``ulimit -v`` and by ``ulimit -d``. macOS does not enforce the first, and Windows has neither."""
+    import psutil
+
     process = psutil.Process()
     if not hasattr(process, "rlimit"):
         return

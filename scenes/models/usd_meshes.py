@@ -12,6 +12,7 @@ import numpy as np
 from jaxtyping import Int
 from numpy.typing import NDArray
 
+from scenes.arithmetic import weighted
 from scenes.canonical import SceneError
 from scenes.formats.geometry.subdivision import Refined
 from scenes.formats.losses import LossReport
@@ -81,7 +82,7 @@ def triangles_of(mesh: Any, code: Any, where: str, report: LossReport) -> Triang
     polygons, of_polygon = len(counts), np.arange(len(counts))
     surface = surface_of(mesh, code, len(points), counts, indices, where, report)
     if surface is not None:
-        points, counts, indices = surface.smooth @ points, surface.cage.counts, surface.cage.indices
+        points, counts, indices = weighted(surface.smooth, points), surface.cage.counts, surface.cage.indices
         of_polygon = surface.polygon
     parts = np.where(hole[of_polygon], 0, np.maximum(counts - 2, 0))
     polygon = np.repeat(np.arange(len(counts)), parts)
@@ -116,7 +117,7 @@ def at_corners(
     if len(values) < (index.max(initial=0) + 1 if refine is None else refine.shape[1]):
         report.add(where, f"{what} ({interpolation}) with {len(values)} values")
         return None
-    return (values if refine is None else refine @ values[: refine.shape[1]])[index]
+    return (values if refine is None else weighted(refine, values[: refine.shape[1]]))[index]
 
 
 def primvar_at_corners(

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from scenes.arithmetic import weighted
 from scenes.formats.geometry.subdivision import SHARP_ALWAYS, Cage, Refined, levels_of, refined, selection
 from scenes.formats.losses import LossReport
 from scenes.models.usd_library import UsdGeom
@@ -67,7 +68,7 @@ def surface_of(
         report.add(where, "triangles that are subdivided smoothly", "as other polygons")
     found = refined(cage, scheme, boundary == "edgeAndCorner")
     own = selection(corners, len(indices))
-    return replace(found, polygon=polygons[found.polygon], corners=(found.corners @ own).tocsr())
+    return replace(found, polygon=polygons[found.polygon], corners=weighted(found.corners, own).tocsr())
 
 
 def _creases(

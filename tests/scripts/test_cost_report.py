@@ -30,7 +30,7 @@ def test_a_report_without_a_measurement(tmp_path: Path) -> None:
         assert part in done.stdout
     found = sorted(path.name for path in (tmp_path / "out").iterdir() if path.name != "files.journal")
     figures = [f"fig_7_{number}.png" for number in (3, 4, 5, 6)]
-    vectors = ["advantage.svg", *(f"fig_7_{number}.svg" for number in (3, 4, 5))]
+    vectors = ["advantage.svg", *(f"fig_7_{number}.svg" for number in (3, 4, 5, 6))]
     assert found == sorted(["advantage.png", "fig_7_6.vtp", "summary.json", *figures, *vectors])
     assert all(name in done.stdout for name in found if name not in vectors)
     summary = json.loads((tmp_path / "out" / "summary.json").read_text())

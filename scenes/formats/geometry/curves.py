@@ -12,7 +12,7 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
-from scenes.arithmetic import product
+from scenes.arithmetic import cos, product, sin
 from scenes.canonical import Curves, Instance, Mesh
 
 SIDES = 12
@@ -145,7 +145,7 @@ def curve_mesh(curves: Curves) -> Mesh:
     if curves.basis == "linear":
         steps = 1
     t = np.arange(steps + 1) / steps
-    weights = np.stack([(1 - t) ** 3, 3 * t * (1 - t) ** 2, 3 * t**2 * (1 - t), t**3], axis=1)
+    weights = np.stack([(1 - t) ** 2 * (1 - t), 3 * t * (1 - t) ** 2, 3 * t**2 * (1 - t), t**2 * t], axis=1)
     slopes = np.stack([-((1 - t) ** 2), (1 - t) * (1 - 3 * t), t * (2 - 3 * t), t**2], axis=1)
     at, along = product(weights, segments), product(slopes, segments)[..., :3]
     length = np.linalg.norm(along, axis=-1, keepdims=True)
@@ -182,7 +182,7 @@ def _prism(curves: Curves, at, along, u) -> Mesh:
         side[:, step] = start
     other = np.cross(along, side)
     angle = 2.0 * np.pi * np.arange(SIDES) / SIDES
-    out = np.cos(angle)[:, None] * side[:, :, None] + np.sin(angle)[:, None] * other[:, :, None]
+    out = cos(angle)[:, None] * side[:, :, None] + sin(angle)[:, None] * other[:, :, None]
     points = at[:, :, None, :3] + 0.5 * at[:, :, None, 3:] * out
     across = np.broadcast_to(np.arange(SIDES) / SIDES, (*u.shape, SIDES))
     uvs = np.stack([np.broadcast_to(u[..., None], across.shape), across], axis=-1)

@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
-from scenes.arithmetic import cos
+from scenes.arithmetic import cos, weighted
 
 LEVELS = 3
 """Levels to which a surface is refined."""
@@ -124,7 +124,7 @@ def _step(found: Refined, scheme: Scheme) -> Refined:
     middle = 0.5 * _matrix(1.0, np.tile(np.arange(edge_count), 2), ends.ravel(), (edge_count, count))
     to_faces = _matrix(1.0 / uses[edge], edge, face, (edge_count, len(cage.counts)))
     if smoothly:
-        between = 0.5 * (middle + to_faces @ face_mean)
+        between = 0.5 * (middle + weighted(to_faces, face_mean))
     else:
         across = _matrix(1.0 / uses[edge], edge, cage.indices[before], (edge_count, count))
         between = 0.75 * middle + 0.25 * across
@@ -159,8 +159,8 @@ def _step(found: Refined, scheme: Scheme) -> Refined:
         np.tile(left[kept], 2), corner_sharpness,
     )  # fmt: skip
     return Refined(
-        finer, polygon, (of_points @ found.smooth).tocsr(), (of_linear @ found.linear).tocsr(),
-        (rows @ found.corners).tocsr(),
+        finer, polygon, weighted(of_points, found.smooth).tocsr(), weighted(of_linear, found.linear).tocsr(),
+        weighted(rows, found.corners).tocsr(),
     )  # fmt: skip
 
 
@@ -175,8 +175,9 @@ def _points(
     neighbours = _matrix(1.0, both[0], both[1], shape)
     if smoothly:
         corners = np.maximum(np.bincount(cage.indices, minlength=count), 1)
-        around = _matrix(1.0 / corners[cage.indices], cage.indices, face, (count, face_mean.shape[0])) @ face_mean
-        inner = _scaled(1.0 - 2.0 / valence, whole) + _scaled(valence**-2.0, neighbours)
+        faces = _matrix(1.0 / corners[cage.indices], cage.indices, face, (count, face_mean.shape[0]))
+        around = weighted(faces, face_mean)
+        inner = _scaled(1.0 - 2.0 / valence, whole) + _scaled(1.0 / valence**2, neighbours)
         inner = inner + _scaled(1.0 / valence, around)
     else:
         beta = (0.625 - (0.375 + 0.25 * cos(2.0 * np.pi / valence)) ** 2) / valence
@@ -220,7 +221,7 @@ def _stacked(parts: list[Sparse]) -> Sparse:
 
 def _scaled(values: NDArray[np.float64], matrix: Sparse) -> Sparse:
     """Rows of a matrix times values."""
-    return sparse.diags_array(values) @ matrix
+    return weighted(sparse.diags_array(values), matrix)
 
 
 def _matrix(values: NDArray[np.float64] | float, rows: Ints, columns: Ints, shape: tuple[int, ...]) -> Sparse:

@@ -262,7 +262,7 @@ def test_figures_of_a_measurement(tmp_path: Path, monkeypatch: pytest.MonkeyPatc
     drawn = [*(f"fig_7_{number}" for number in (3, 4, 5)), "advantage", "refit", "scaling", "memory"]
     assert {path.name for path in tmp_path.iterdir()} - {".owner", "files.journal"} == {
         *(f"{name}.{ending}" for name in drawn for ending in ("png", "svg")),
-        *("fig_7_6.png", "fig_7_6.vtp", "summary.json"),
+        *("fig_7_6.png", "fig_7_6.svg", "fig_7_6.vtp", "summary.json"),
     }
     for path in tmp_path.glob("*.png"):
         with Image.open(path) as picture:

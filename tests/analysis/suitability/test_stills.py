@@ -45,8 +45,7 @@ def test_figures_say_what_ran() -> None:
     )
     assert over_time is not None and all_errors is not None and boxed is not None
     assert "row 7: batch 8, 128² (thesis: 128, 512²)" in over_time.axes[0].get_title(loc="left")
-    legends = [axis.get_legend() for axis in all_errors.axes]
-    named = [text.get_text() for one in legends if one is not None for text in one.get_texts()]
+    named = [text.get_text() for axis in all_errors.axes for text in axis.texts]
     assert "batch 8, 128² (thesis: 128, 512²)" in named and not any(text.startswith("batch 128") for text in named)
     assert "128² (thesis: 512²)" in [text.get_text() for text in boxed.legends[0].get_texts()]
 
