@@ -1,4 +1,4 @@
-"""Curves of USD, such as hair, as meshes: tubes, or ribbons where they have normals.
+"""Curves of USD, such as hair: tubes, or ribbons where they have normals.
 
 Source: OpenUSD documentation, UsdGeomBasisCurves.
 """
@@ -11,8 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scenes.arithmetic import product
-from scenes.canonical import Curves, Mesh
-from scenes.formats.geometry.curves import TO_BEZIER, curve_mesh
+from scenes.canonical import Curves
+from scenes.formats.geometry.curves import TO_BEZIER, chained
 from scenes.formats.losses import LossReport
 from scenes.models.usd_library import UsdGeom
 from scenes.models.usd_values import array_of, finite
@@ -70,8 +70,11 @@ class _Segments:
         return np.stack([values[begin + self.index], values[begin + second]], axis=1)
 
 
-def curves_of(prim: Any, code: Any, where: str, report: LossReport) -> Mesh | None:
-    """Curves as a mesh; None, with a loss, where their numbers do not fit.
+def curves_of(prim: Any, code: Any, where: str, report: LossReport) -> Curves | None:
+    """The curves of a prim; None, with a loss, where their numbers do not fit.
+
+    Those of Catmull and Rom become chains of Bézier curves, exactly, and so do B-splines that are closed or pinned, or
+    whose widths are not those of their points.
 
     Raises:
         SceneError: numbers are not finite.
@@ -88,34 +91,40 @@ def curves_of(prim: Any, code: Any, where: str, report: LossReport) -> Mesh | No
         return None
     if curves.GetPointsAttr().GetNumTimeSamples() > 1:
         report.add(where, "curves that move", "their places at the start")
-    found = segments.controls(points)
-    width = found.shape[1]
     given = finite(array_of(curves.GetWidthsAttr().Get(code), 1), f"{where}: widths")
-    if not len(given):
-        report.add(where, "curves without widths", "curves of width 1")
-    widths = _of(given, str(curves.GetWidthsInterpolation()), segments, len(points)) if len(given) else None
+    widths = _of(given, str(curves.GetWidthsInterpolation()), segments, len(points))
     if widths is None:
-        widths = np.ones((1, width, 1))
-        if len(given):
-            report.add(where, f"{len(given)} widths of curves, whose number does not fit", "widths of 1")
+        what = f"{len(given)} widths of curves, whose number does not fit" if len(given) else "curves without widths"
+        report.add(where, what, "widths of 1")
+        given = np.ones((1, 1))
+        widths = given[None]
+    if (given < 0.0).any():
+        report.add(where, "widths of curves below zero", "widths of 0")
     normals = finite(array_of(curves.GetNormalsAttr().Get(code), 3), f"{where}: normals")
-    across = _of(normals, str(curves.GetNormalsInterpolation()), segments, len(points)) if len(normals) else None
-    report.hint(where, f"{len(counts):,} curves", "tubes of twelve sides" if across is None else "ribbons")
-    shape = (len(found), width)
-    made = Curves(
-        found.reshape(-1, 3).astype(np.float32),
-        np.maximum(np.broadcast_to(widths[..., 0], shape), 0.0).astype(np.float32).reshape(-1),
-        np.full(len(found), width, np.int32),
-        "linear" if basis == "linear" else "bezier",
-        "tube" if across is None else "ribbon",
-        None if across is None else np.broadcast_to(across, (*shape, 3))[:, [0, -1]].reshape(-1, 3).astype(np.float32),
-    )
-    return curve_mesh(made)
+    across = _of(normals, str(curves.GetNormalsInterpolation()), segments, len(points))
+    if across is None and len(normals):
+        report.add(where, f"{len(normals)} normals of curves, whose number does not fit", "tubes")
+    even = widths.shape[:2] == (1, 1)
+    if basis == "bspline" and wrap == "nonperiodic" and (even or len(given) == len(points)):
+        rows = np.concatenate([points, np.broadcast_to(widths[0] if even else given, (len(points), 1))], axis=1)
+        kept = "bspline"
+    else:
+        found = segments.controls(points)
+        rows = chained(np.concatenate([found, np.broadcast_to(widths, (*found.shape[:2], 1))], axis=2), segments.of)
+        counts = (found.shape[1] - 1) * segments.number + 1
+        kept = "linear" if basis == "linear" else "bezier"
+    if across is not None:
+        ends = np.broadcast_to(across, (len(segments.of), across.shape[1], 3))[:, [0, -1]]
+        across = chained(ends, segments.of).astype(np.float32)
+    return Curves(
+        rows[:, :3].astype(np.float32), np.maximum(rows[:, 3], 0.0).astype(np.float32), counts.astype(np.int32), kept,
+        "tube" if across is None else "ribbon", across,
+    )  # fmt: skip
 
 
 def _of(values: NDArray[np.float64], interpolation: str, segments: _Segments, count: int) -> NDArray[np.float64] | None:
     """Values at the control points of every segment; None if their number does not fit."""
-    if interpolation == "constant" or len(values) == 1:
+    if len(values) and (interpolation == "constant" or len(values) == 1):
         return values[:1, None]
     if interpolation == "uniform" and len(values) == len(segments.counts):
         return values[segments.of][:, None]

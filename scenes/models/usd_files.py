@@ -198,11 +198,15 @@ class _Reader:
             self.report.add(name, "an opacity without a material", "opaque")
         if prim.IsA(UsdGeom.Mesh):
             return self._mesh(UsdGeom.Mesh(prim), name)
-        curves = curves_of(prim, self.code, name, self.report) if kind == "BasisCurves" else None
-        if kind == "BasisCurves" and curves is None:
-            return []
-        if kind not in (*SHAPES, "BasisCurves"):
+        if kind == "BasisCurves":
+            curves = curves_of(prim, self.code, name, self.report)
+            shapes = [] if curves is None else [(curves, np.eye(4))]
+        elif kind in SHAPES:
+            shapes = shapes_of(prim, self.code)
+        else:
             self.report.add(name, f"a prim of kind {kind}")
+            shapes = []
+        if not shapes:
             return []
         number, colors = self.described.number(self._bound(prim), bool(UsdGeom.Gprim(prim).GetDoubleSidedAttr().Get()))
         if self.described.coordinates(number):
@@ -214,7 +218,6 @@ class _Reader:
             color = finite(_GREY if not found else np.array(found[0], np.float64), f"{name}: primvar {colors}")
             color = np.broadcast_to(color, (1, 3, 3))
         material = self.materials.painted(number, {}, color).material
-        shapes = shapes_of(prim, self.code) if curves is None else [(curves, np.eye(4))]
         return [(shape, material, local) for shape, local in shapes]
 
     def _mesh(self, mesh: Any, name: str) -> list[_Part]:

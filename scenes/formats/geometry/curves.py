@@ -48,15 +48,24 @@ def bezier_segments(curves: Curves) -> Segments:
     return product(matrix, found), of
 
 
+def chained(segments: NDArray[np.float64], of: NDArray[np.int64]) -> NDArray[np.float64]:
+    """Control points ``(n, k)`` of chains of segments ``(s, w, k)``, each of which ends where the next one of its curve
+    begins.
+
+    Args:
+        segments: control points of the segments.
+        of: the curve ``(s,)`` of each.
+    """
+    kept = np.ones(segments.shape[:2], bool)
+    kept[:-1, -1] = of[1:] != of[:-1]
+    return segments[kept]
+
+
 def as_bezier(curves: Curves) -> Curves:
     """The same curves as chains of cubic Bézier curves."""
     if curves.basis == "bezier":
         return curves
-    segments, of = bezier_segments(curves)
-    last = np.concatenate([of[1:] != of[:-1], [True]])
-    parts = np.concatenate([segments[:, :3], np.where(last[:, None, None], segments[:, 3:], np.nan)], axis=1)
-    rows = parts.reshape(-1, 4)
-    rows = rows[~np.isnan(rows[:, 0])]
+    rows = chained(*bezier_segments(curves))
     counts = (3 * curves.segments + 1).astype(np.int32)
     return dataclasses.replace(
         curves, points=rows[:, :3].astype(np.float32), widths=_widths(rows[:, 3]), counts=counts, basis="bezier"
