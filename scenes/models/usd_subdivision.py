@@ -66,7 +66,7 @@ def surface_of(
         report.add(where, "values at corners that bend with the surface", "linear ones within each polygon")
     if (mesh.GetTriangleSubdivisionRuleAttr().Get() or "catmullClark") != "catmullClark" and scheme != "loop":
         report.add(where, "triangles that are subdivided smoothly", "as other polygons")
-    found = refined(cage, scheme, boundary == "edgeAndCorner")
+    found = refined(cage, scheme, levels, boundary == "edgeAndCorner")
     own = selection(corners, len(indices))
     return replace(found, polygon=polygons[found.polygon], corners=weighted(found.corners, own).tocsr())
 

@@ -17,6 +17,7 @@ from scenes.formats.directives.syntax import Parameters
 from scenes.formats.geometry import revolution
 from scenes.formats.geometry.orientation import facing_normals, turned
 from scenes.formats.geometry.ply_files import checked_mesh, read_ply
+from scenes.formats.geometry.subdivision import LEVELS, loop_surface
 from scenes.formats.losses import LossReport
 from scenes.formats.text.scene_files import SceneFiles
 
@@ -48,8 +49,7 @@ class ShapeReader:
                 parameters.asked.update(parameters.given)
                 return None
             if kind == "loopsubdiv":
-                parameters.asked.update(parameters.given)
-                self.report.add(where, "a subdivision surface", "its control mesh")
+                mesh = self._subdivided(mesh, parameters)
             return facing_normals(turned(mesh) if turn_over else mesh), UNMOVED
         if kind == "bilinearmesh":
             return turned(self._patches(parameters)) if turn_over else self._patches(parameters), UNMOVED
@@ -65,6 +65,14 @@ class ShapeReader:
         else:
             self.report.unknown(where, "shape", kind)
         return None
+
+    def _subdivided(self, mesh: Mesh, parameters: Parameters) -> Mesh:
+        """The surface of a mesh by Loop's scheme, of which PBRT draws the limit."""
+        wanted = parameters.whole("levels", parameters.whole("nlevels", LEVELS, 0, 1 << 20), 0, 1 << 20)
+        made, levels = loop_surface(mesh, wanted)
+        became = f"triangles after {levels} level{'s' * (levels != 1)}" if levels else "its control mesh"
+        self.report.add(str(parameters.place), "a subdivision surface", became)
+        return made
 
     def _quadric(self, kind: str, parameters: Parameters, turn_over: bool) -> tuple[Shape, Matrix]:
         radius = parameters.number("radius", 1.0)

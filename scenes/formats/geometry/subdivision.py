@@ -18,6 +18,9 @@ from numpy.typing import NDArray
 from scipy import sparse
 
 from scenes.arithmetic import cos, weighted
+from scenes.canonical import Mesh
+from scenes.canonical.values import vertices_of
+from scenes.formats.geometry.orientation import area_normals
 
 LEVELS = 3
 """Levels to which a surface is refined."""
@@ -88,12 +91,13 @@ def levels_of(cage: Cage, scheme: Scheme) -> int:
     return next((level for level in range(LEVELS, 0, -1) if share * 4 ** (level - 1) <= 1.0), 0)
 
 
-def refined(cage: Cage, scheme: Scheme, sharp_corners: bool = True) -> Refined:
-    """The surface of a cage after :func:`levels_of` steps.
+def refined(cage: Cage, scheme: Scheme, levels: int, sharp_corners: bool = True) -> Refined:
+    """The surface of a cage after some steps.
 
     Args:
         cage: polygons; triangles for Loop's scheme.
         scheme: rule of subdivision.
+        levels: number of steps, at most that of :func:`levels_of`.
         sharp_corners: whether points of a single polygon stay where they are, as the ends of edges of a boundary do.
     """
     if sharp_corners:
@@ -101,9 +105,24 @@ def refined(cage: Cage, scheme: Scheme, sharp_corners: bool = True) -> Refined:
         cage = replace(cage, corner_sharpness=np.where(alone, np.inf, cage.corner_sharpness))
     points, corners = (_whole(count) for count in (cage.point_count, len(cage.indices)))
     found = Refined(cage, np.arange(len(cage.counts)), points, points, corners)
-    for _ in range(levels_of(cage, scheme)):
+    for _ in range(levels):
         found = _step(found, scheme)
     return found
+
+
+def loop_surface(mesh: Mesh, levels: int) -> tuple[Mesh, int]:
+    """Triangles of Loop's scheme with smooth normals, in place of a mesh, and the number of steps: at most ``levels``
+    and :func:`levels_of`. Texture coordinates are interpolated linearly."""
+    count, faces = len(mesh.vertices), mesh.faces.astype(np.int64)
+    cage = Cage(count, np.full(len(faces), 3), faces.ravel(), np.zeros((0, 2), np.int64), np.zeros(0), np.zeros(count))
+    levels = min(levels, levels_of(cage, "loop"))
+    found = refined(cage, "loop", levels, sharp_corners=False)
+    points, faces = weighted(found.smooth, mesh.vertices.astype(np.float64)), found.cage.indices.reshape(-1, 3)
+    around = _matrix(1.0, faces.ravel(), np.repeat(np.arange(len(faces)), 3), (len(points), len(faces)))
+    normals = weighted(around, area_normals(points[faces]))
+    normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-300)
+    uvs = None if mesh.uvs is None else weighted(found.linear, mesh.uvs.astype(np.float64)).astype(np.float32)
+    return Mesh(vertices_of(points), faces.astype(np.int32), normals.astype(np.float32), uvs, mesh.source), levels
 
 
 def _step(found: Refined, scheme: Scheme) -> Refined:

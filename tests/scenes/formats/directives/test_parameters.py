@@ -67,7 +67,8 @@ NOTHING = {
     "infinite of a map: from", "hyperboloid: radius",  # what these do not have
     "point: to", "point: efficacy", "spot: efficacy", "infinite: gamma",  # without a direction, a power or a picture
     "coatedconductor: interface.eta", "coatedconductor: remaproughness",  # its coat is reported as a whole
-    "mesh: triindices", "trianglemesh: triindices",  # beside indices, which have the same meaning
+    "mesh: triindices", "trianglemesh: triindices", "loopsubdiv: triindices",  # beside indices, with the same meaning
+    "loopsubdiv: N",  # its surface has normals of its own
     "translucent: Ks", "translucent: remaproughness",  # its glossy part is reported whenever there is one
 }  # fmt: skip
 CANDIDATES = (
@@ -95,7 +96,7 @@ def texts(dialect: str) -> Iterator[str]:
     materials = found.materials.split()
     yield from (f'{bare}Material "{kind}" "float roughness" .2 {{}}\nShape "sphere"\n' for kind in materials)
     yield from (f'{bare}Shape "{kind}" {{}}\n' for kind in SHAPES)
-    yield f'{bare}Shape "{found.mesh}" {{}} {POINTS}\n'
+    yield from (f'{bare}Shape "{mesh}" {{}} {POINTS}\n' for mesh in (found.mesh, "loopsubdiv"))
     yield from (
         f'{bare}{{}}Integrator "volpath"\n'.replace("{}", f'{one}Shape "sphere"\n') for one in found.media.split("|")
     )

@@ -15,6 +15,7 @@ from scenes.canonical import (
     EnvironmentLight,
     Masked,
     Matte,
+    Mesh,
     MixMaterial,
     OrthographicCamera,
     PerspectiveCamera,
@@ -220,3 +221,14 @@ def test_triindices_beside_indices_are_a_loss(tmp_path: Path) -> None:
         tmp_path, f'Shape "trianglemesh" "integer indices" [0 1 2] "integer triindices" [1 3 2] {points}\n'
     )
     assert len(scene.instances[0].shape.faces) == 1 and any("triindices beside indices" in loss for loss in lost)
+
+
+def test_subdivision_surfaces_have_the_levels_of_their_file(tmp_path: Path) -> None:
+    """A tetrahedron, whose corners come to a fifth of their distance from the middle."""
+    points = '"point P" [ 1 1 1 -1 -1 1 -1 1 -1 1 -1 -1 ] "integer indices" [ 0 1 2 0 3 1 0 2 3 1 3 2 ]'
+    for levels, count in (("", 256), ('"integer nlevels" 1', 16), ('"integer levels" 0', 4)):
+        scene, lost = pbrt(tmp_path, f'Shape "loopsubdiv" {points} {levels}')
+        (found,) = scene.instances
+        assert isinstance(found.shape, Mesh) and len(found.shape.faces) == count and len(lost) == 1
+    corner = pbrt(tmp_path, f'Shape "loopsubdiv" {points}')[0].instances[0].shape.vertices[0]  # type: ignore[union-attr]
+    assert corner == pytest.approx((0.2, 0.2, 0.2), abs=0.01)
