@@ -35,6 +35,7 @@ NAMES = {
     "chosen": "choose tiles",
     "taken_in": "take in",
     "drifted": "shadows",
+    "detailed": "tell noise",
     "displayed": "smooth",
 }
 """Stages of the filter by the names of their rows."""
@@ -55,7 +56,8 @@ def policy(options: BenchOptions, bars: Bars) -> Iterator[Row]:
 def policy_cycles(config: TsarConfig, renderer: Renderer, task: Task) -> list[Mapping[str, float]]:
     """Seconds by stage of the cycles after the warm-up."""
     seconds: dict[str, float] = {}
-    setting = Setting(config, lambda config: timed(default_stages(config), seconds), view=renderer.viewpoint)
+    made = lambda config: timed(default_stages(config), seconds)  # noqa: E731
+    setting = Setting(config, made, view=renderer.viewpoint, random=lambda: renderer.random)
     tsar, found = Filter(setting), []
     trace = run(tsar, renderer.trace, fixed_clock(CYCLE_S), 0.0, math.inf)
     for number, (_, display) in enumerate(islice(trace, tsar.warmup_cycles + MEASURED_CYCLES)):

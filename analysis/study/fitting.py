@@ -18,7 +18,7 @@ _STILL = Viewpoint(
 
 
 def fitting(case: Case) -> Case:
-    """The case, if cycles of its policy fit into it.
+    """The case, if cycles of its policy fit into it, at the price for scenes whose samples draw no random numbers.
 
     Raises:
         ConfigError: they do not.

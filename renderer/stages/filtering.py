@@ -14,6 +14,7 @@ from renderer.compute.memory import Memory, Recycled
 from renderer.compute.team import TEAM, shares
 from renderer.stages import filtering_kernels as kernels
 from renderer.stages import picture_kernels
+from renderer.stages.noise import Detailed
 from renderer.stages.poses import pose_words, rows_of
 from renderer.stages.sizes import FRAME, LEVEL_PLANES, PIXEL_WORDS
 from tsar.filtering.batches import Traced
@@ -37,7 +38,8 @@ def filter_stages(side: int, threads: int = 1, picture: tuple[int, int] | None =
     """Kernels for a plane of ``side`` pixels, a power of two of at least 16. ``picture`` is the height and width of the
     picture within it, by default the whole plane."""
     made = _Compiled(side, threads, picture or (side, side))
-    return FilterStages(made.advanced, made.chosen, made.taken_in, made.drifted, made.displayed)
+    detailed = Detailed(side, threads, picture or (side, side))
+    return FilterStages(made.advanced, made.chosen, made.taken_in, made.drifted, detailed, made.displayed)
 
 
 class _Compiled:

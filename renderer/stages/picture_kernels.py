@@ -1,5 +1,5 @@
-"""Kernel entry points of the filter's stages that show a picture and choose tiles (``native/pyramid.h``, ``gains.h``),
-as defined in ``tsar/filtering``. Threads share rows."""
+"""Kernel entry points of the filter's stages that show a picture and choose tiles (``native/pyramid.h``,
+``noise.h``, ``gains.h``), as defined in ``tsar/filtering``. Threads share rows."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from renderer.compute.launching import Address
 from renderer.compute.native_code import module_options
 from renderer.stages import sizes
 
-wp.set_module_options(module_options("gains.h", "pyramid.h", given=sizes.FILTERING))
+wp.set_module_options(module_options("gains.h", "noise.h", "pyramid.h", given=sizes.FILTERING))
 
 
 @wp.func_native("""
@@ -64,6 +64,10 @@ def native_smooth(levels: Address, side: wp.int32, width: wp.int32, height: wp.i
 
 @wp.func_native("pyramid::show(*(const pyramid::Picture*)picture, side, first, last, (float*)spare);")
 def native_show(picture: Address, side: wp.int32, first: wp.int32, last: wp.int32, spare: Address): ...
+
+
+@wp.func_native("noise::detailed(*(const noise::Planes*)planes, first, last, (float*)spare);")
+def native_detailed(planes: Address, first: wp.int32, last: wp.int32, spare: Address): ...
 
 
 @wp.kernel
@@ -121,3 +125,9 @@ def smooth(levels: Address, side: wp.int32, width: wp.int32, height: wp.int32, s
 def show(picture: Address, side: wp.int32, first: wp.int32, last: wp.int32, spare: Address):
     """Computes the picture from some rows of the second finest level."""
     native_show(picture, side, first, last, spare)
+
+
+@wp.kernel
+def detailed(planes: Address, first: wp.int32, last: wp.int32, spare: Address):
+    """Computes some rows of the roughness without noise; ``planes`` is a ``noise::Planes``."""
+    native_detailed(planes, first, last, spare)

@@ -41,12 +41,15 @@ POSE_NUMBERS = 12
 """Count of numbers that take an instance to the camera: three rows of a matrix, and an offset."""
 LEVEL_PLANES = 5
 """Number of planes of a level of the picture's pyramid: red, green, blue, variance, roughness."""
+NOISE_ROWS = 22
+"""Number of rows that a thread keeps to tell noise from detail: nine of colours, twelve of sums, and one."""
 
 FILTERING: dict[str, float] = {
     "PIXEL_WORDS": PIXEL_WORDS,
     "FRAME": FRAME,
     "POSE_NUMBERS": POSE_NUMBERS,
     "LEVEL_PLANES": LEVEL_PLANES,
+    "NOISE_ROWS": NOISE_ROWS,
     "NOTHING_KNOWN": records.NOTHING_KNOWN,
     "VARIANCE_MAX": records.VARIANCE_MAX,
     "UNSEEN": records.UNSEEN,

@@ -21,9 +21,8 @@ def displayed(
 ) -> tuple[Float[Tensor, "3 h w"], Float[Tensor, "1 h w"]]:
     """Picture and variance of its errors ``seconds`` later, :func:`smoothed`. The surfels belong to the estimates; None
     without reprojection. ``between`` is the roughness between pixels where it is not that of the samples. Pixels of the
-    greatest variance do not contribute to their surroundings. ``picture`` is the
-    height and width of the picture where it is not the whole plane: both results are 0 outside it, and nothing outside
-    contributes."""
+    greatest variance do not contribute to their surroundings. ``picture`` is the height and width of the picture where
+    it is not the whole plane: both results are 0 outside it, and nothing outside contributes."""
     later = estimates.later(rate, seconds)
     if surfels is not None:
         later = later.beside(surfels)

@@ -20,16 +20,17 @@ PIXEL_FLOPS = 60.0
 """Operations per output pixel and cycle, as a test counts them in the code."""
 
 
-def detailed(estimates: Estimates, picture: tuple[int, int]) -> Float[Tensor, "1 h w"]:
+def detailed(estimates: Estimates, picture: tuple[int, int] | None = None) -> Float[Tensor, "1 h w"]:
     """The roughness that neighbouring estimates confirm, at most that of the samples.
 
     Let ``S`` be half the mean squared difference of neighbouring estimates, ``g`` the roughness and ``i`` the inverse
     of the number of samples, each averaged over 3 x 3 pixels. Noise alone gives ``S = g i``. The share of detail is
-    ``d = (S - g i) / (g - g i)``, clipped to [0, 1], and the result ``g (i + (1 - i) d)``. With one sample a
-    pixel noise and detail cannot be told apart, and the result is ``g``. ``picture`` is the height and width of the
-    part of the plane that is shown; the result is 0 outside.
+    ``d = (S - g i) / (g - g i)``, clipped to [0, 1], and the result ``g (i + (1 - i) d)``. With one sample a pixel
+    noise and detail cannot be told apart, and the result is ``g``. ``picture`` is the height and width of the picture
+    where it is not the whole plane: the result is 0 outside it, and nothing outside contributes.
     """
-    (height, width), side = picture, estimates.inverse.shape[-1]
+    side = estimates.inverse.shape[-1]
+    height, width = picture or (side, side)
     color, roughness, inverse = (
         plane[:, :height, :width] for plane in (estimates.color, estimates.roughness, estimates.inverse)
     )

@@ -11,6 +11,7 @@ from torch import Tensor
 from tsar.filtering.batches import Traced, taken_in
 from tsar.filtering.display import displayed
 from tsar.filtering.motion import advanced
+from tsar.filtering.noise import detailed
 from tsar.filtering.options import FilterOptions
 from tsar.filtering.records import Change, Estimates, Surfels
 from tsar.filtering.shadows import drifted
@@ -28,6 +29,7 @@ class FilterStages:
         chosen: the tiles to sample.
         taken_in: estimates, surfels and change after a batch.
         drifted: speed of the shadows over each element, after a batch.
+        detailed: the roughness between pixels without noise.
         displayed: the picture, and the variance of its errors.
     """
 
@@ -37,6 +39,7 @@ class FilterStages:
         taken_in
     )
     drifted: Callable[[Tensor, Tensor, Hits, Viewpoint, Viewpoint, float], Tensor] = drifted
+    detailed: Callable[[Estimates], Tensor] = detailed
     displayed: Callable[[Estimates, Surfels | None, Tensor, float, Tensor | None], tuple[Tensor, Tensor]] = displayed
 
 
@@ -53,5 +56,6 @@ def reference(window: Window) -> FilterStages:
         partial(advanced, picture=shape),
         partial(chosen, picture=shape),
         partial(taken_in, picture=shape),
+        detailed=partial(detailed, picture=shape),
         displayed=partial(displayed, picture=shape),
     )

@@ -17,9 +17,8 @@ from torch import Tensor
 from tsar.filtering import densities
 from tsar.filtering.options import DEFAULT, FilterOptions
 from tsar.filtering.records import ELEMENT_PX, TILE_SIDE
-from tsar.policies.filter import PIXEL_FLOPS as OF_GAINS
 from tsar.policies.filter import Filter, State
-from tsar.policy import Moment, Price, Setting, require_square
+from tsar.policy import Moment, Setting, require_square
 
 _AGED = 4.0
 """Weight of the variance from change so far, relative to that of the next cycle; values from 1 to 8 give the same error
@@ -48,9 +47,8 @@ class ByDensities(Filter):
         require_square(self.config, "tsar-densities")
 
     @property
-    def price(self) -> Price:
-        price = super().price
-        return replace(price, pixel_flops=price.pixel_flops + PIXEL_FLOPS - OF_GAINS[True])
+    def pixel_flops(self) -> float:
+        return PIXEL_FLOPS
 
     def start(self) -> DenseState:
         """The initial credit is a seeded permutation in [0, 1), as in :func:`tsar.selection.initial_history`."""

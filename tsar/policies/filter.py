@@ -127,8 +127,13 @@ class Filter(Policy[State]):
         return max(self.config.warmup_cycles, _WARMUP_FRAMES * self.config.pixels // (self._tiles * TILE_SIDE**2))
 
     @property
+    def pixel_flops(self) -> float:
+        """Operations per output pixel and cycle, without those that tell noise from detail."""
+        return PIXEL_FLOPS[self._options.reprojection]
+
+    @property
     def price(self) -> Price:
-        pixel_flops = PIXEL_FLOPS[self._options.reprojection] + noise.PIXEL_FLOPS * self._noisy
+        pixel_flops = self.pixel_flops + noise.PIXEL_FLOPS * self._noisy
         return Price(self._tiles * TILE_SIDE**2, pixel_flops=pixel_flops, sample_flops=SAMPLE_FLOPS)
 
     def start(self) -> State:
@@ -264,7 +269,7 @@ class Filter(Policy[State]):
 
     def _displayed(self, state: State, moment: Moment, color: Float[Tensor, "3 h w"] | None = None) -> State:
         surfels, estimates = state.reprojected, state.estimates
-        between = noise.detailed(estimates, self.config.shape) if self._noisy else None
+        between = self._stages.detailed(estimates) if self._noisy else None
         if color is not None:
             estimates = replace(estimates, color=color)
         if not self._options.smoothing:

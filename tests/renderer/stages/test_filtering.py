@@ -13,6 +13,7 @@ from renderer.stages.control import stages
 from renderer.stages.filtering import filter_stages
 from tests.oracles.screens import Layer, Screen
 from tsar.config import TilingConfig, TsarConfig
+from tsar.filtering.noise import detailed
 from tsar.filtering.options import DEFAULT, FilterOptions
 from tsar.filtering.records import ELEMENT_PX, UNSEEN, VARIANCE_MAX, Estimates, Surfels, centres
 from tsar.filtering.stages import FilterStages
@@ -103,6 +104,18 @@ def test_pictures_are_those_of_the_reference(side: int, threads: int) -> None:
         arguments = estimates, surfels if seed % 2 else None, rates(side, seed), 0.02 * seed, between
         for ours, theirs in zip(compiled.displayed(*arguments), REFERENCE.displayed(*arguments), strict=True):
             assert torch.equal(ours, theirs)
+
+
+@pytest.mark.parametrize("threads", [1, 3, 16])
+@pytest.mark.parametrize("picture", [(16, 16), (64, 64), (64, 1), (33, 50), (1, 64)])
+def test_noise_is_told_as_in_the_reference(picture: tuple[int, int], threads: int) -> None:
+    side = 16 if max(picture) <= 16 else 64
+    compiled = filter_stages(side, threads, picture)
+    for seed in range(3):
+        estimates, _, _ = scene(side, "perspective", seed)
+        inverse = estimates.inverse if seed else torch.ones_like(estimates.inverse)
+        smooth = replace(estimates, color=0.5 + 0.1 * seed * (estimates.color - 0.5), inverse=inverse)
+        assert torch.equal(compiled.detailed(smooth), detailed(smooth, picture))
 
 
 @pytest.mark.parametrize("kind", ["perspective", "parallel"])

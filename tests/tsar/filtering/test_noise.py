@@ -41,20 +41,20 @@ DETAIL = (0.3 + 0.4 * torch.rand(1, SIDE, SIDE, generator=torch.Generator().manu
 def test_noise_confirms_only_what_its_samples_leave(count: int) -> None:
     """Noise alone: the mean is near ``g i``; a part of the pixels differ from their neighbours by chance."""
     estimates = estimated(GREY, 0.05, count)
-    share = detailed(estimates, (SIDE, SIDE)) / estimates.roughness
+    share = detailed(estimates) / estimates.roughness
     assert 1.0 / count <= float(share.min()) and float(share.mean()) < 1.25 / count + 0.1
 
 
 @pytest.mark.parametrize("count", [2, 4, 16])
 def test_detail_keeps_its_roughness(count: int) -> None:
     estimates = estimated(DETAIL, 0.0, count)
-    share = detailed(estimates, (SIDE, SIDE)) / estimates.roughness
+    share = detailed(estimates) / estimates.roughness
     assert float(share.median()) > 0.9 and float(share.max()) <= 1.0 + 1e-6
 
 
 def test_one_sample_a_pixel_tells_nothing() -> None:
     estimates = estimated(GREY, 0.05, 1)
-    assert torch.equal(detailed(estimates, (SIDE, SIDE)), estimates.roughness)
+    assert torch.equal(detailed(estimates), estimates.roughness)
 
 
 def test_nothing_outside_the_picture_counts() -> None:
