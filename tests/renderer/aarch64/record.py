@@ -187,7 +187,9 @@ def main(folder: Path) -> None:
     config = TsarConfig(batch_size=16, resolution_px=64, sdf_side=16, cache_size=64, warmup_cycles=2)
     for name in ("thesis", "tsar"):
         stages = compiled_stages(config)
-        setting = Setting(config, lambda _, stages=stages: stages, None, renderer.trace, renderer.viewpoint)
+        setting = Setting(
+            config, lambda _, stages=stages: stages, None, renderer.trace, renderer.viewpoint, lambda: True
+        )
         for _ in run(POLICIES[name](setting), renderer.trace, fixed_clock(1 / 60), 0.0, 8 / 60):
             pass
     recorder.write(folder)

@@ -31,7 +31,7 @@ KERNELS = {
     *("claim_slots", "observe_batch", "decide_next", "take_account"),
     *("find_candidates", "paint_bands", "bury_dead"),
     *("offer", "choose", "take", "locate", "gather", "learn", "take_in", "drifted"),
-    *("gain", "best", "shrink", "smooth", "show"),
+    *("gain", "best", "shrink", "smooth", "show", "detailed"),
 }
 
 
