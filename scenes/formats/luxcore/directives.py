@@ -13,9 +13,8 @@ import numpy as np
 from scenes.arithmetic import product
 from scenes.formats.directives.syntax import Directive, Values
 from scenes.formats.luxcore.syntax import Block, Property
+from scenes.formats.luxrender.read import LUMINANCE
 from scenes.formats.text.places import TextPosition
-
-LUMINANCE = np.array([0.212671, 0.715160, 0.072169])
 
 NAMES = {
     "kd": "Kd", "ks": "Ks", "kr": "Kr", "kt": "Kt", "ka": "Ka", "material1": "namedmaterial1", "base": "base",

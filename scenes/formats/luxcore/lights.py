@@ -13,8 +13,9 @@ from numpy.typing import NDArray
 from scenes.arithmetic import cos, product
 from scenes.formats.directives.syntax import Values
 from scenes.formats.losses import LossReport
-from scenes.formats.luxcore.directives import LUMINANCE, numbers, parameters
+from scenes.formats.luxcore.directives import numbers, parameters
 from scenes.formats.luxcore.syntax import Block, Property
+from scenes.formats.luxrender.read import LUMINANCE
 
 _KINDS = {"sharpdistant": "distant", "constantinfinite": "infinite", "mappoint": "goniometric"}
 _NAMES = {"position": "from", "target": "to", "dir": "sundir", "file": "mapname"}

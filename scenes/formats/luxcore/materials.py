@@ -15,9 +15,10 @@ from scenes.formats.appearance.folding import mean_of
 from scenes.formats.directives.names import Names
 from scenes.formats.directives.syntax import Values
 from scenes.formats.losses import LossReport
-from scenes.formats.luxcore.directives import LUMINANCE, numbers, parameters, texts
+from scenes.formats.luxcore.directives import numbers, parameters, texts
 from scenes.formats.luxcore.surfaces import DEFAULTS, MATERIALS, TEXTURES
 from scenes.formats.luxcore.syntax import Block, Property
+from scenes.formats.luxrender.read import LUMINANCE
 
 _FRESNEL = ("fresnelpreset", "fresnelcolor", "fresnelconst", "fresnelsopra", "fresnelluxpop", "fresneltexture")
 _SIDES = {"interior": ("interiorior", "iorinside"), "exterior": ("exteriorior", "ioroutside")}

@@ -25,14 +25,14 @@ from scenes.formats.directives.scene_reader import scene_of
 from scenes.formats.directives.syntax import Directive, Parameters, Values, parameters_of
 from scenes.formats.losses import LossReport
 from scenes.formats.luxcore.defaults import drop_meaningless
-from scenes.formats.luxcore.directives import LUMINANCE, directive, numbers, parameters, texts
+from scenes.formats.luxcore.directives import directive, numbers, parameters, texts
 from scenes.formats.luxcore.files import LuxCoreFiles
 from scenes.formats.luxcore.lights import color_unit, light_values, lumens_of
 from scenes.formats.luxcore.materials import material_values, texture_values, volume_values
 from scenes.formats.luxcore.settings import settings
 from scenes.formats.luxcore.surfaces import LuxCoreSurfaces
 from scenes.formats.luxcore.syntax import Block, Property, parsed_properties, parts_of
-from scenes.formats.luxrender.read import LuxReader
+from scenes.formats.luxrender.read import LUMINANCE, LuxReader
 from scenes.formats.text.places import TextPosition
 
 _PARTS = ("textures", "volumes", "materials", "shapes", "objects", "lights")

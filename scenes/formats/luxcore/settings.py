@@ -22,7 +22,12 @@ _SAMPLERS = {"SOBOL": "sobol", "RANDOM": "random", "METROPOLIS": "metropolis", "
 _FILTERS = {"NONE": "box", "BOX": "box", "GAUSSIAN": "gaussian", "MITCHELL": "mitchell", "MITCHELL_SS": "mitchell",
             "SINC": "sinc", "CATMULLROM": "mitchell", "BLACKMANHARRIS": "gaussian"}  # fmt: skip
 _REPLACED = ("MITCHELL_SS", "CATMULLROM", "BLACKMANHARRIS")
-_DEPTH, _WIDTH_PX, _HEIGHT_PX = 6, 640, 480
+_FILTER, _FILTER_PX = "BLACKMANHARRIS", 2.0
+_WIDTH_PX, _HEIGHT_PX = 640, 480
+_DEPTHS = {"total": 6, "diffuse": 4, "glossy": 4, "specular": 6}
+"""Most bounces of a path: of all kinds, and of each kind of scattering. Those of the kinds end paths earlier."""
+
+_BIDIRECTIONAL_DEPTH = 5
 
 _SAME_PICTURE = tuple(
     "film. renderengine. sampler. batch. periodicsave. opencl. cuda. context. native. accelerator. screen. tile. "
@@ -48,28 +53,34 @@ def settings(found: Block, place_of: Property, file: Path, report: LossReport) -
     def one(key: str, default: float) -> float:
         return float(found[key].numbers(1)[0]) if key in found else default
 
+    # a scene alone has no configuration whose defaults could be lost
+    lost = report if any(not key.startswith("scene.") for key in found) else LossReport()
     size = one("film.width", _WIDTH_PX), one("film.height", _HEIGHT_PX)
     film = [*numbers("xresolution", size[0]), *numbers("yresolution", size[1])]
     if one("batch.haltspp", 0.0):
         film += numbers("haltspp", one("batch.haltspp", 0.0))
     yield made("Film", "film.width", "fleximage", film)
-    if "film.filter.type" in found:
-        yield from _filter(found, file, report)
+    yield _filter(found, place_of, file, lost)
     if "sampler.type" in found:
         yield made("Sampler", "sampler.type", _kind(found, "sampler.type", _SAMPLERS, report), [])
     engine = _kind(found, "renderengine.type", _ENGINES, report) if "renderengine.type" in found else "path"
-    total = next((key for key in ("path.pathdepth.total", "path.maxdepth") if key in found), "")
-    depth = one(total, _DEPTH)
-    values = numbers("maxdepth", depth)
     if engine == "bidirectional":
-        values = numbers("eyedepth", depth) + numbers("lightdepth", one("light.maxdepth", depth))
-    yield made("SurfaceIntegrator", total, engine, values)
-    for kind in ("diffuse", "glossy", "specular"):
-        key = f"path.pathdepth.{kind}"
-        if key in found and one(key, depth) >= depth - 1.0:
-            del found[key]
-    for key in ("film.width", "film.height", "batch.haltspp", "sampler.type", "renderengine.type", total,
-                "light.maxdepth"):  # fmt: skip
+        eye, light = (one(key, _BIDIRECTIONAL_DEPTH) for key in ("path.maxdepth", "light.maxdepth"))
+        yield made(
+            "SurfaceIntegrator", "path.maxdepth", engine, numbers("eyedepth", eye) + numbers("lightdepth", light)
+        )
+    else:
+        keys = {kind: f"path.pathdepth.{kind}" for kind in _DEPTHS}
+        if "path.maxdepth" in found and not any(key in found for key in keys.values()):
+            keys = dict.fromkeys(keys, "path.maxdepth")
+        depths = {kind: one(keys[kind], most) for kind, most in _DEPTHS.items()}
+        for kind, most in depths.items():
+            if most < depths["total"]:
+                where = str(found.get(keys[kind], place_of).place)
+                lost.add(where, f"at most {most:g} {kind} bounces", f"{depths['total']:g}, as of all kinds")
+        yield made("SurfaceIntegrator", "path.pathdepth.total", engine, numbers("maxdepth", depths["total"]))
+    for key in ("film.width", "film.height", "batch.haltspp", "sampler.type", "renderengine.type", "path.maxdepth",
+                "light.maxdepth", *(f"path.pathdepth.{kind}" for kind in _DEPTHS)):  # fmt: skip
         found.pop(key, None)
     for key, left in list(found.items()):
         if key.startswith(_SAME_PICTURE):
@@ -84,19 +95,18 @@ def _kind(found: Block, key: str, kinds: dict[str, str], report: LossReport) -> 
     return kinds.get(wanted, next(iter(kinds.values())))
 
 
-def _filter(found: Block, file: Path, report: LossReport) -> Iterator[Directive]:
-    kind = found.pop("film.filter.type")
-    wanted, name = kind.word(), _FILTERS.get(kind.word(), "gaussian")
+def _filter(found: Block, place_of: Property, file: Path, report: LossReport) -> Directive:
+    kind = found.pop("film.filter.type", None)
+    wanted, place = _FILTER if kind is None else kind.word(), (kind or place_of).place
+    name = _FILTERS.get(wanted, "gaussian")
     if wanted not in _FILTERS:
-        report.unknown(kind.place, "filter", wanted, name)
+        report.unknown(place, "filter", wanted, name)
     elif wanted in _REPLACED:
-        report.add(str(kind.place), f"filter {wanted!r}", name)
+        report.add(str(place), f"filter {wanted!r}", name)
+    both = found.pop("film.filter.width", None)
     values: list[Values] = []
     for axis in ("x", "y"):
-        for key in (f"film.filter.{axis}width", "film.filter.width"):
-            if key in found and wanted != "NONE":
-                values += numbers(f"{axis}width", *found[key].numbers(1).tolist())
-                break
-    for key in ("film.filter.xwidth", "film.filter.ywidth", "film.filter.width"):
-        found.pop(key, None)
-    yield directive("PixelFilter", (name,), values, kind.place, file)
+        width = found.pop(f"film.filter.{axis}width", both)
+        if wanted != "NONE":
+            values += numbers(f"{axis}width", _FILTER_PX if width is None else float(width.numbers(1)[0]))
+    return directive("PixelFilter", (name,), values, place, file)

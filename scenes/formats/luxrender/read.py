@@ -60,7 +60,8 @@ model is the same, in luminous units (683 lm/W); the sun model differs and is di
 a turbidity of 3 in ``tests/scripts/test_conversion_check.py``."""
 _TRANSFORMS = ("Identity", "Translate", "Scale", "Rotate", "LookAt", "Transform", "ConcatTransform",
                "CoordSysTransform")  # fmt: skip
-_LUMINANCE = np.array([0.212671, 0.715160, 0.072169])
+LUMINANCE = np.array([0.212671, 0.715160, 0.072169])
+"""Weights of linear red, green and blue in LuxRender and LuxCore."""
 
 
 def cone_sr(angle_deg: float) -> float:
@@ -283,7 +284,7 @@ class LuxReader(LuxMediaReader):
         power, emission = self.attributes.power, self.attributes.emission
         if len(self.instances) == count or emission is None or not power > 0.0:
             return
-        luminance = float(product(_LUMINANCE, emission))
+        luminance = float(product(LUMINANCE, emission))
         lamp = self.instances[-1]
         size = area(as_mesh(lamp.shape), lamp.to_world[:3, :3])
         if luminance > 0.0 and size > 0.0:
