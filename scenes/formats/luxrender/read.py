@@ -60,8 +60,7 @@ model is the same, in luminous units (683 lm/W); the sun model differs and is di
 a turbidity of 3 in ``tests/scripts/test_conversion_check.py``."""
 _TRANSFORMS = ("Identity", "Translate", "Scale", "Rotate", "LookAt", "Transform", "ConcatTransform",
                "CoordSysTransform")  # fmt: skip
-LUMINANCE = np.array([0.212671, 0.715160, 0.072169])
-"""Weights of linear red, green and blue in LuxRender and LuxCore."""
+LUMINANCE = np.array([0.212671, 0.715160, 0.072169])  # of linear RGB
 
 
 def cone_sr(angle_deg: float) -> float:

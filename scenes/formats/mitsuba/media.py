@@ -16,6 +16,7 @@ from scenes.formats.appearance.media_presets import mitsuba_medium
 from scenes.formats.appearance.spectra import grey, rgb
 from scenes.formats.losses import LossReport
 from scenes.formats.mitsuba.properties import Properties
+from scenes.formats.mitsuba.read_textures import MISSING
 from scenes.formats.text.xml_tree import XmlNode
 
 _HINTS = ("strategy", "samplingDensity", "mediumSamplingWeight", "channel", "sampleEmitters", "hasSpectralExtinction")
@@ -43,6 +44,8 @@ class MitsubaMedia:
 
     def _read(self, node: XmlNode) -> Medium | None:
         kind, properties = node.get("type"), Properties(node, self.report)
+        if kind == MISSING:
+            return None
         if kind != "homogeneous":
             named = f" {node.get('id')!r}" if node.get("id") else ""
             self.report.add(properties.where, f"the medium{named} of the type {kind!r} (participating medium)")

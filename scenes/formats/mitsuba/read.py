@@ -34,6 +34,9 @@ _OF_MEDIA = ("volpath",)
 _OF_MEDIA_0 = (*_OF_MEDIA, "volpath_simple", "bdpt", "mlt", "pssmlt", "erpt", "ptracer", "photonmapper")
 """Integrators that draw media, of Mitsuba 3 and of 0.5."""
 
+_MEDIA = ("interior", "exterior", "medium")
+"""Names of references to media."""
+
 _NAME_MAX = 256
 """Maximum number of characters of a parameter's name."""
 
@@ -47,7 +50,7 @@ class MitsubaReader(MitsubaSettings):
         self.names: dict[str, XmlNode] = {}
         self.defaults: dict[str, str] = {}
         self._longest = 0
-        self._missing: dict[str, XmlNode] = {}
+        self._missing: dict[tuple[str, str], XmlNode] = {}
         self.surfaces = MitsubaSurfaces(files, report, self.find)
         self.media = MitsubaMedia(report, self.find)
         self.shapes = MitsubaShapes(files, report, self.surfaces, self.media, self.find)
@@ -149,15 +152,15 @@ class MitsubaReader(MitsubaSettings):
         return self.names[name]
 
     def find(self, reference: XmlNode) -> XmlNode:
-        """The element to which a reference refers; for an unknown name a grey one, which is reported."""
-        name = reference.get("id")
+        """The element to which a reference refers; for an unknown name a grey or empty one, which is reported."""
+        name, part = reference.get("id"), reference.get("name")
         if name in self.names:
             return self.names[name]
-        self.report.add(str(reference.place), f"{name!r}, which no earlier element has as its name", "grey")
-        if name not in self._missing:
-            tag = "texture" if reference.get("name") else "bsdf"
-            self._missing[name] = XmlNode(tag, {"type": MISSING if tag == "texture" else "diffuse"}, reference.place)
-        return self._missing[name]
+        tag = "medium" if part in _MEDIA else "texture" if part else "bsdf"
+        became = "vacuum" if tag == "medium" else "grey"
+        self.report.add(str(reference.place), f"{name!r}, which no earlier element has as its name", became)
+        kind = "diffuse" if tag == "bsdf" else MISSING
+        return self._missing.setdefault((name, tag), XmlNode(tag, {"type": kind}, reference.place))
 
     def _node(self, node: XmlNode) -> None:
         if node.tag in ("integrator", "sensor", "camera", "sampler", "film"):

@@ -198,6 +198,14 @@ def test_other_media_are_losses(body: str, loss: str, tmp_path: Path) -> None:
     assert len(lost) == 1 and loss in lost[0]
 
 
+@pytest.mark.parametrize("version", ["0.5.0", "3.0.0"])
+def test_media_of_mitsuba_that_are_missing_are_losses(version: str, tmp_path: Path) -> None:
+    sensor = '<sensor type="perspective"><float name="fov" value="40"/><ref name="medium" id="m"/></sensor>'
+    scene, lost = xml(tmp_path, f'{sensor}<shape type="sphere"><ref name="interior" id="m"/></shape>', version)
+    assert [one.partition(": ")[2] for one in lost] == ["'m', which no earlier element has as its name: vacuum"] * 2
+    assert media_of(scene) == [] and len(scene.instances) == (version == "3.0.0")
+
+
 @pytest.mark.parametrize("inner", ['"rgb sigma_a" [ -1 0 0 ]', '"float g" 1', '"float scale" 1e30 "rgb sigma_a" 1e30'])
 def test_impossible_media_are_one_line(inner: str, tmp_path: Path) -> None:
     with pytest.raises(SceneError, match=r"a.pbrt:2:1: .*expected"):
