@@ -41,7 +41,7 @@ class Attributes:
     emission_twosided: bool = False
     power: float = 0.0  # power to which the emission is scaled, lumens; 0 for none
     reversed: bool = False
-    interior: Medium | None = None  # media of both sides; an empty one is vacuum that is given
+    interior: Medium | None = None  # media of both sides, as given; see SceneReader.drawn
     exterior: Medium | None = None
     # parameters for the following directives, by target and name
     assumed: Mapping[tuple[str, str], tuple[Values, Values]] = field(default_factory=dict)

@@ -133,7 +133,7 @@ class SceneReader(DirectiveReader):
 
     def _read_camera(self, directive: Directive) -> None:
         kind, parameters = typed(directive)
-        self.medium = None if self.attributes.exterior is None else filled(self.attributes.exterior)
+        self.medium = self.attributes.exterior
         keys = [inverse(matrix) for matrix in self.transforms.current]
         self.transforms.named["camera"] = keys
         track = self._motion(keys, str(directive.place))
@@ -230,9 +230,13 @@ class SceneReader(DirectiveReader):
     def _motion(self, keys: Sequence[Matrix], where: str) -> RigidTrack | None:
         return motion(keys, self.transforms.times_s, where, self.report)
 
+    def drawn(self, medium: Medium | None) -> Medium | None:
+        """The medium of a side as it is drawn, None for vacuum."""
+        return None if medium is None else filled(medium)
+
     def sides(self) -> tuple[Medium | None, Medium | None]:
         """The media inside and outside of the following shapes."""
-        return self.attributes.interior, self.attributes.exterior
+        return self.drawn(self.attributes.interior), self.drawn(self.attributes.exterior)
 
     def read_shape(self, directive: Directive) -> None:
         kind, parameters = typed(directive)
@@ -285,16 +289,8 @@ def scene_of(reader: SceneReader, path: Path) -> Scene:
         camera = PerspectiveCamera(FORWARD, 90.0)
     elif reader.window is not None:
         camera = fitted(camera, reader.window, reader.film, reader.report)
-    scene = Scene(
-        camera,
-        tuple(joined(reader.instances)),
-        tuple(reader.lights),
-        reader.film,
-        reader.sampler,
-        reader.integrator,
-        medium=reader.medium,
-        materials=dict(reader.names.materials),
-        name=Path(path).stem,
-        duration_s=duration_s(camera, reader.instances),
-    )
+    parts = tuple(joined(reader.instances)), tuple(reader.lights), reader.film, reader.sampler, reader.integrator
+    lasts, materials = duration_s(camera, reader.instances), dict(reader.names.materials)
+    medium, name = reader.drawn(reader.medium), Path(path).stem
+    scene = Scene(camera, *parts, medium=medium, materials=materials, name=name, duration_s=lasts)
     return reader.as_drawn(scene)

@@ -16,7 +16,7 @@ import numpy as np
 
 from scenes.canonical import ConstantTexture, Glass, Material, Medium, Rgb, SceneError
 from scenes.formats.appearance.folding import mean_of
-from scenes.formats.appearance.media import filled, made_medium
+from scenes.formats.appearance.media import made_medium
 from scenes.formats.appearance.spectra import grey
 from scenes.formats.directives.reader import word
 from scenes.formats.directives.scene_reader import SceneReader
@@ -119,8 +119,7 @@ class LuxMediaReader(SceneReader):
         return self.volumes.get(name)
 
     def sides(self) -> tuple[Medium | None, Medium | None]:
-        inside, outside = super().sides()
-        return (None, None) if inside is None else (filled(inside), None if outside is None else filled(outside))
+        return (None, None) if self.attributes.interior is None else super().sides()
 
     def read_shape(self, directive: Directive) -> None:
         given = self.attributes.material

@@ -20,6 +20,14 @@ from scenes.formats.losses import LossReport
 _MILK = Medium((0.0011, 0.0024, 0.014), (2.55, 3.21, 3.77))  # the default
 
 
+@dataclass(frozen=True)
+class _Named(Medium):
+    """A medium by its name, which may be made later: before a shape that has it, or anywhere if it is the camera's."""
+
+    name: str = ""
+    where: str = ""
+
+
 @dataclass
 class PbrtMedia:
     """The media of a file by name, which belong to the whole scene; None for those that are left out.
@@ -68,10 +76,13 @@ class PbrtMedia:
     def interface(self, directive: Directive, attributes: Attributes) -> None:
         """Sets the media of both sides of the following shapes; one name stands for both."""
         names = [word(directive, at) for at in range(max(1, min(2, len(directive.values))))]
-        sides = [self._found(name, str(directive.place)) for name in names]
+        sides = [_Named(name=name, where=str(directive.place)) if name else None for name in names]
         attributes.interior, attributes.exterior = sides[0], sides[-1]
 
-    def _found(self, name: str, where: str) -> Medium | None:
-        if name and name not in self.named:
-            self.report.add(where, f"the medium {name!r}, which is not defined", "vacuum")
-        return self.named.get(name)
+    def found(self, medium: Medium | None) -> Medium | None:
+        """The medium that has the name of a side."""
+        if not isinstance(medium, _Named):
+            return None
+        if medium.name not in self.named:
+            self.report.add(medium.where, f"the medium {medium.name!r}, which is not defined", "vacuum")
+        return self.named.get(medium.name)

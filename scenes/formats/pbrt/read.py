@@ -12,7 +12,7 @@ from typing import ClassVar
 import numpy as np
 
 from scenes import loading
-from scenes.canonical import EnvironmentLight, Integrator, Rgb, Sampler, Scene
+from scenes.canonical import EnvironmentLight, Integrator, Medium, Rgb, Sampler, Scene
 from scenes.formats.appearance.media import as_drawn_by
 from scenes.formats.appearance.spectra import rgb
 from scenes.formats.directives import lights
@@ -71,6 +71,9 @@ class PbrtReader(SceneReader):
 
     def _read_medium(self, directive: Directive) -> None:
         self.left_over(self.media.make(directive), f"medium {word(directive)!r}")
+
+    def drawn(self, medium: Medium | None) -> Medium | None:
+        return self.media.found(medium)
 
     def as_drawn(self, scene: Scene) -> Scene:
         drawn = self._drawn_by in self.of_media

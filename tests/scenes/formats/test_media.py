@@ -85,6 +85,15 @@ def test_media_of_pbrt(tmp_path: Path) -> None:
     assert sum("the border of a medium" in loss for loss in lost) == 1
 
 
+def test_media_of_pbrt_may_be_made_after_their_names_are_given(tmp_path: Path) -> None:
+    """PBRT looks them up at the shapes, and that of the camera at the end."""
+    fog = 'MakeNamedMedium "fog" "string type" "homogeneous" "rgb sigma_a" [ 1 2 3 ] "rgb sigma_s" [ 0 0 0 ]\n'
+    head = 'Integrator "volpath"\nMediumInterface "" "fog"\nCamera "perspective"\nWorldBegin\n'
+    scene, lost = pbrt(tmp_path, f'MediumInterface "fog" ""\n{fog}Shape "sphere"\n', head)
+    assert lost == ["a.pbrt:1:1: integrator 'volpath': path"]
+    assert scene.medium == scene.instances[0].interior == Medium((1.0, 2.0, 3.0))
+
+
 @pytest.mark.parametrize(("version", "scattering"), [("3", 9.0), ("4", 0.74)])
 def test_presets_of_pbrt_beside_coefficients(version: str, scattering: float, tmp_path: Path) -> None:
     """Coefficients that are given count in version 3, the preset in version 4."""
