@@ -6,7 +6,6 @@ pixel, whatever filter a file asks for, so that pictures differ by the scene alo
 
 from __future__ import annotations
 
-import contextlib
 import json
 import subprocess
 import sys
@@ -143,13 +142,15 @@ _PROGRAMS = {"mitsuba": _MITSUBA, "luxcore": _LUXCORE}
 
 _MODULES = {"mitsuba": "mitsuba", "luxcore": "pyluxcore"}
 
-# Imports of renderers are as long as small pictures take: processes of several pictures begin as copies of one.
+# Imports of renderers are as long as small pictures take: processes of several pictures begin as copies of one, and
+# each ends when its time is over.
 _SEVERAL = """
-import importlib, json, os, sys, numpy
-module, program, jobs = sys.argv[1], sys.argv[2], json.loads(sys.argv[3])
+import importlib, json, os, signal, sys, numpy
+module, program, limit_s, jobs = *sys.argv[1:3], float(sys.argv[3]), json.loads(sys.argv[4])
 importlib.import_module(module)
 for job in jobs:
     if os.fork() == 0:
+        signal.setitimer(signal.ITIMER_REAL, limit_s)
         sys.argv[1:] = job
         try:
             exec(program, {"__name__": "__main__"})
@@ -209,7 +210,6 @@ def drawn(
     for _, out in files:
         out.unlink(missing_ok=True)
     jobs = json.dumps([[str(file), str(out), *map(str, (*size, samples, 0))] for file, out in files])
-    command = [sys.executable, "-c", _SEVERAL, _MODULES[program], _PROGRAMS[program], jobs]
-    with contextlib.suppress(subprocess.TimeoutExpired):
-        subprocess.run(command, capture_output=True, timeout=limit_s * len(files), check=False)
+    command = [sys.executable, "-c", _SEVERAL, _MODULES[program], _PROGRAMS[program], str(limit_s), jobs]
+    subprocess.run(command, capture_output=True, check=False)
     return {out: np.load(out) for _, out in files if out.is_file()}

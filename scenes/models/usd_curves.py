@@ -110,12 +110,13 @@ def curves_of(prim: Any, code: Any, where: str, report: LossReport) -> Curves | 
         kept = "bspline"
     else:
         found = segments.controls(points)
-        rows = chained(np.concatenate([found, np.broadcast_to(widths, (*found.shape[:2], 1))], axis=2), segments.of)
+        rows = np.concatenate([found, np.broadcast_to(widths, (*found.shape[:2], 1))], axis=2)
+        rows = chained(rows, segments.index == 0, found.shape[1] - 1)
         counts = (found.shape[1] - 1) * segments.number + 1
         kept = "linear" if basis == "linear" else "bezier"
     if across is not None:
         ends = np.broadcast_to(across, (len(segments.of), across.shape[1], 3))[:, [0, -1]]
-        across = chained(ends, segments.of).astype(np.float32)
+        across = chained(ends, segments.index == 0, 1).astype(np.float32)
     return Curves(
         rows[:, :3].astype(np.float32), np.maximum(rows[:, 3], 0.0).astype(np.float32), counts.astype(np.int32), kept,
         "tube" if across is None else "ribbon", across,

@@ -23,7 +23,8 @@ def finite(value: Any, where: object) -> Any:
     """
     numbers = np.asarray(value)
     if numbers.dtype.kind == "f" and not np.isfinite(numbers).all():
-        raise SceneError(f"cannot be read: {where}: expected finite numbers, got {value}")
+        got = value if numbers.ndim < 2 else numbers[~np.isfinite(numbers).all(axis=-1)][0].tolist()  # the first row
+        raise SceneError(f"cannot be read: {where}: expected finite numbers, got {got}")
     return value
 
 

@@ -8,6 +8,7 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Sequence
 from functools import lru_cache
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -48,24 +49,29 @@ def bezier_segments(curves: Curves) -> Segments:
     return product(matrix, found), of
 
 
-def chained(segments: NDArray[np.float64], of: NDArray[np.int64]) -> NDArray[np.float64]:
-    """Control points ``(n, k)`` of chains of segments ``(s, w, k)``, each of which ends where the next one of its curve
-    begins.
+def normals_at_ends(curves: Curves) -> NDArray[np.float32] | None:
+    """Normals ``(s, 2, 3)`` at both ends of all segments of ribbons."""
+    if curves.normals is None:
+        return None
+    second = np.delete(np.arange(len(curves.normals)), np.cumsum(curves.segments + 1) - curves.segments - 1)
+    return np.stack([curves.normals[second - 1], curves.normals[second]], axis=1)
 
-    Args:
-        segments: control points of the segments.
-        of: the curve ``(s,)`` of each.
-    """
-    kept = np.ones(segments.shape[:2], bool)
-    kept[:-1, -1] = of[1:] != of[:-1]
-    return segments[kept]
+
+def chained(parts: NDArray[Any], first: NDArray[np.bool_], new: int) -> NDArray[Any]:
+    """Rows ``(n, k)`` of chains of segments ``(s, w, k)``: all of those that are the first of a chain ``(s,)``, and of
+    the others the last ``new``, before which they share the end of the segment before."""
+    kept = np.zeros(parts.shape[:2], bool)
+    kept[:, -new:] = True
+    kept[first] = True
+    return parts[kept]
 
 
 def as_bezier(curves: Curves) -> Curves:
     """The same curves as chains of cubic Bézier curves."""
     if curves.basis == "bezier":
         return curves
-    rows = chained(*bezier_segments(curves))
+    segments, of = bezier_segments(curves)
+    rows = chained(segments, np.diff(of, prepend=-1) > 0, 3)
     counts = (3 * curves.segments + 1).astype(np.int32)
     return dataclasses.replace(
         curves, points=rows[:, :3].astype(np.float32), widths=_widths(rows[:, 3]), counts=counts, basis="bezier"
@@ -81,24 +87,14 @@ def as_bspline(curves: Curves) -> Curves:
     size = np.abs(segments).max()
     joined = np.abs(found[1:, :3] - found[:-1, 1:]).max(axis=(1, 2)) <= 1e-5 * size
     first = np.concatenate([[True], ~(joined & (of[1:] == of[:-1]))])
-    begins = np.flatnonzero(first)
-    lengths = np.diff(np.append(begins, len(found)))
-    rows = np.concatenate(
-        [np.concatenate([found[a], found[a + 1 : a + n, 3]]) for a, n in zip(begins, lengths, strict=True)]
-    )
-    normals = None
-    if curves.normals is not None:
-        ends = np.arange(len(of)) + of  # each curve before has one more normal than segments
-        normals = np.concatenate(
-            [curves.normals[ends[a] : ends[a] + n + 1] for a, n in zip(begins, lengths, strict=True)]
-        )
+    rows, normals = chained(found, first, 1), normals_at_ends(curves)
     return dataclasses.replace(
         curves,
         points=rows[:, :3].astype(np.float32),
         widths=_widths(rows[:, 3]),
-        counts=(lengths + 3).astype(np.int32),
+        counts=(np.diff(np.append(np.flatnonzero(first), len(found))) + 3).astype(np.int32),
         basis="bspline",
-        normals=normals,
+        normals=None if normals is None else chained(normals, first, 1),
     )
 
 
@@ -164,15 +160,15 @@ def curve_mesh(curves: Curves) -> Mesh:
     u = (np.arange(len(of)) - np.searchsorted(of, of))[:, None] + t
     u = u / curves.segments[of][:, None]
     if curves.normals is not None:
-        return _strip(curves, at, along, u, of, t)
+        return _strip(curves, at, along, u, t)
     return _prism(curves, at, along, u)
 
 
-def _strip(curves: Curves, at, along, u, of, t) -> Mesh:
+def _strip(curves: Curves, at, along, u, t) -> Mesh:
     """Strips across the normals of ribbons."""
-    assert curves.normals is not None
-    ends = np.arange(len(of)) + of
-    normals = (1 - t)[:, None] * curves.normals[ends][:, None] + t[:, None] * curves.normals[ends + 1][:, None]
+    ends = normals_at_ends(curves)
+    assert ends is not None
+    normals = (1 - t)[:, None] * ends[:, :1] + t[:, None] * ends[:, 1:]
     side = np.cross(normals, along)
     side /= np.maximum(np.linalg.norm(side, axis=-1, keepdims=True), 1e-30)
     half = 0.5 * at[..., 3:] * side

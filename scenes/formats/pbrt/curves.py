@@ -12,7 +12,7 @@ import numpy as np
 
 from scenes.canonical import Curves, SceneError
 from scenes.formats.directives.syntax import Parameters
-from scenes.formats.geometry.curves import as_bezier
+from scenes.formats.geometry.curves import as_bezier, bezier_segments, normals_at_ends
 from scenes.formats.losses import LossReport
 from scenes.formats.text.numbers import listed, number
 
@@ -130,13 +130,8 @@ def _even(curves: Curves) -> bool:
 
 def _cut(curves: Curves) -> Curves:
     """Each segment of chains of Bézier curves as a curve of its own."""
-    begins = np.cumsum(curves.counts) - curves.counts
-    of = np.repeat(np.arange(len(curves.counts)), curves.segments)
-    number_of = np.arange(len(of)) - np.repeat(np.cumsum(curves.segments) - curves.segments, curves.segments)
-    rows = ((begins[of] + 3 * number_of)[:, None] + np.arange(4)).ravel()
-    ends = np.arange(len(of)) + of
-    normals = None if curves.normals is None else curves.normals[np.stack([ends, ends + 1], axis=1).ravel()]
-    counts = np.full(len(of), 4, np.int32)
-    return dataclasses.replace(
-        curves, points=curves.points[rows], widths=curves.widths[rows], counts=counts, normals=normals
-    )
+    segments, _ = bezier_segments(curves)
+    rows, normals = segments.reshape(-1, 4).astype(np.float32), normals_at_ends(curves)
+    normals = None if normals is None else normals.reshape(-1, 3)
+    counts = np.full(len(segments), 4, np.int32)
+    return dataclasses.replace(curves, points=rows[:, :3], widths=rows[:, 3], counts=counts, normals=normals)

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+from analysis.conversion import peers
 from analysis.conversion.peers import drawn, rendered
 from analysis.conversion.specimens import lamp
 from scenes.formats.conversion import save_scene_file
@@ -30,3 +32,20 @@ def test_pictures_of_one_start_are_those_of_single_ones(
         single = rendered(program, file, tmp_path / "single.npy", (24, 24), 64, 100.0)
         assert not isinstance(single, str), single
         np.testing.assert_allclose(found[out].mean(axis=(0, 1)), single.mean(axis=(0, 1)), rtol=0.03)
+
+
+def test_a_picture_that_takes_too_long_ends_and_leaves_the_others_their_time(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    program = """
+import os, sys, time, numpy
+open(sys.argv[2] + ".pid", "w").write(str(os.getpid()))
+time.sleep(600 if "slow" in sys.argv[1] else 0)
+numpy.save(sys.argv[2], numpy.ones((1, 1, 3)))
+"""
+    monkeypatch.setitem(peers._PROGRAMS, "waits", program)
+    monkeypatch.setitem(peers._MODULES, "waits", "json")
+    files = [(tmp_path / name, tmp_path / f"{name}.npy") for name in ("slow", "quick")]
+    assert set(drawn("waits", files, (1, 1), 1, 2.0)) == {files[1][1]}
+    with pytest.raises(ProcessLookupError):
+        os.kill(int((tmp_path / "slow.npy.pid").read_text()), 0)

@@ -12,6 +12,11 @@ from scenes.formats.losses import LossReport
 from scenes.models import read_model, read_whole
 from tests.scenes.models.usd import BOUND, QUAD, READER, ST, material, mesh, texture, written
 
+CURVE = """def BasisCurves "h" {{ uniform token type = "linear"
+    int[] curveVertexCounts = [2]
+    point3f[] points = [{}]
+    float[] widths = [{}] }}"""
+
 
 @pytest.mark.parametrize(
     ("body", "where"),
@@ -26,6 +31,8 @@ from tests.scenes.models.usd import BOUND, QUAD, READER, ST, material, mesh, tex
         (mesh() + 'def Camera "C" { float fStop = nan }', "camera C"),
         (mesh() + 'def Camera "C" { float focalLength = nan }', "camera C"),
         ('def Sphere "b" { color3f[] primvars:displayColor = [(nan, 0, 0)] }', "b: primvar displayColor"),
+        (CURVE.format("(0, 0, 0), (nan, 1, 0)", "1, 1"), "h: points: expected finite numbers, got [nan, 1.0, 0.0]"),
+        (CURVE.format("(0, 0, 0), (1, 1, 0)", "1, inf"), "h: widths: expected finite numbers, got [inf]"),
     ],
 )
 def test_values_that_are_not_finite_are_refused(body: str, where: str, tmp_path: Path) -> None:
