@@ -10,7 +10,7 @@ import numpy as np
 
 from analysis.command.progress import Task
 from analysis.conversion.options import CheckOptions
-from analysis.conversion.peers import RenderedImage, rendered
+from analysis.conversion.peers import ENGINES, RenderedImage, rendered
 
 if TYPE_CHECKING:
     from scenes.canonical import Instance, Scene
@@ -64,7 +64,7 @@ def _pictures(
     scene = load_scene_file(source, options.root, read)
     size = _size(options, scene)
     targets = {"mitsuba": ("mitsuba3", folder / "mitsuba3.xml"), "luxcore": ("luxrender", folder / "luxrender.lxs")}
-    own = {"luxrender": "luxcore", "luxcore": "luxcore", "mitsuba": "mitsuba"}.get(format_of(source))
+    own = ENGINES.get(format_of(source))
     jobs = [(f"{own}, as it is", own, source)] if own else []
     lost = {"": [str(loss) for loss in read.losses]}
     for program, (kind, file) in targets.items():

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from analysis.conversion.peers import RenderedImage, rendered
+from analysis.conversion.peers import ENGINES, RenderedImage, rendered
 
 EYE, TARGET, UP = np.array([3.0, 2.0, 4.0]), np.array([0.2, 0.1, -0.3]), np.array([0.0, 1.0, 0.0])
 FOV_DEG = 40.0
@@ -183,7 +183,7 @@ def marker_offsets(
             file = work / f"native{ending}"
             file.write_bytes(text.encode())
             kept = {"from": source, "film": shape}
-            program = {"luxrender": "luxcore", "mitsuba": "mitsuba"}.get(source)
+            program = ENGINES.get(source)
             if program:
                 found = rendered(program, file, work / "native.npy", size, SAMPLES, limit_s)
                 rows.append({**kept, "to": "as it is", "renderer": program, **_offset(found, size, source == "pbrt")})

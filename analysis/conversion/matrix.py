@@ -22,13 +22,11 @@ from numpy.typing import NDArray
 from analysis.command.progress import Task
 from analysis.conversion.media_specimens import fog, media_in_sun, media_under_sky
 from analysis.conversion.options import FORMATS_OF
-from analysis.conversion.peers import RenderedImage, drawn, rendered
+from analysis.conversion.peers import ENGINES, RenderedImage, drawn, rendered
 from analysis.conversion.specimens import CELL_PX, DISTANT, LAMPS, Specimens, distant, lamp, materials
 from scenes.canonical import Scene
 from scenes.formats.conversion import load_scene_file, save_scene_file
 from scenes.formats.losses import LossReport
-
-ENGINES = {"mitsuba": "mitsuba", "mitsuba3": "mitsuba", "luxrender": "luxcore"}
 
 BOUND = 0.02
 """Relative difference above which a cell is called off."""

@@ -159,6 +159,9 @@ for job in jobs:
     os.wait()
 """
 
+ENGINES = {"mitsuba": "mitsuba", "mitsuba3": "mitsuba", "luxrender": "luxcore", "luxcore": "luxcore"}
+"""The renderer of each format that has one."""
+
 RenderedImage = NDArray[np.float32]
 
 
