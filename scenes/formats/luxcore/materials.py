@@ -5,6 +5,7 @@ Source: LuxCore SDK reference manual (wiki of LuxCoreRender), sections on textur
 
 from __future__ import annotations
 
+import math
 from collections.abc import Container, Mapping
 
 import numpy as np
@@ -72,6 +73,9 @@ def material_values(name: str, block: Block, names: Names, report: LossReport) -
     values: list[Values] = []
     if given in ("glass", "archglass", "roughglass"):
         kind, values = _glass(given, block, names.colors)
+    if given in ("matte", "roughmatte") and "sigma" in block:  # which LuxCore 2.10 takes in radians, measured
+        sigma = _number(block.pop("sigma"), names.colors)
+        values += numbers("sigma", math.degrees(sigma) if given == "roughmatte" else 0.0)
     if given == "metal2" and "fresnel" not in block:
         values += texts(fresnel=_index(name, block, names))
     for parameter, default in DEFAULTS.get(kind, {}).items():

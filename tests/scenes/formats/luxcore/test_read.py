@@ -126,7 +126,11 @@ def test_materials(tmp_path: Path) -> None:
     cases: list[tuple[str, Material]] = [
         ("type = matte", Matte(ConstantTexture((0.75,) * 3))),
         ("type = matte|kd = 0.1 0.2 0.3", Matte(ConstantTexture((0.1, 0.2, 0.3)))),
-        ('type = "roughmatte"|kd = "0.1 0.2 0.3"|sigma = 20', Matte(ConstantTexture((0.1, 0.2, 0.3)), 20.0)),
+        (
+            'type = "roughmatte"|kd = "0.1 0.2 0.3"|sigma = 0.5',
+            Matte(ConstantTexture((0.1, 0.2, 0.3)), math.degrees(0.5)),
+        ),
+        ("type = matte|kd = 0.5|sigma = 0.5", Matte(half)),
         ("type = mirror|kr = 0.5", Mirror(half)),
         ("type = glass|interiorior = 1.5|exteriorior = 1.25|kt = 0.5 0.5 0.5", Glass(white, half, 1.2)),
         ("type = glass|iorinside = 1.4|ioroutside = 1", Glass(white, white, 1.4)),
