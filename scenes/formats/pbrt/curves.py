@@ -16,7 +16,7 @@ from scenes.formats.geometry.curves import as_bezier, bezier_segments, normals_a
 from scenes.formats.losses import LossReport
 from scenes.formats.text.numbers import listed, number
 
-_KINDS = {"flat": "flat", "cylinder": "cylinder", "ribbon": "ribbon"}
+_KINDS = ("flat", "cylinder", "ribbon")
 _SPLIT = "splitdepth"
 _ALIKE = 1e-4  # difference of widths that is none, relative to the greatest
 
@@ -61,7 +61,7 @@ def read_curve(parameters: Parameters, report: LossReport) -> Curves:
         np.maximum(widths, 0.0).astype(np.float32),
         np.array([len(rows)], np.int32),
         basis,  # type: ignore[arg-type]
-        _KINDS[kind],  # type: ignore[arg-type]
+        kind,  # type: ignore[arg-type]
         _normals(parameters, kind, segments, report),
     )
 
