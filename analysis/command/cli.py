@@ -159,12 +159,12 @@ def run_cli(main: Callable[[], None]) -> None:
     reads standard output any more, as after ``| head``, the process ends without a line and with status 141.
     """
     _spin_briefly()
-    _encodable()
+    _open_streams()
     warnings.showwarning = _one_warning
     try:
         with heeded():
             main()
-            _written()
+            sys.stdout.flush()
     except (InputError, BrokenPipeError) as error:
         if any(isinstance(cause, BrokenPipeError) for cause in _with_causes(error)) and _unread():
             os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())  # nothing reads what is left
@@ -211,7 +211,7 @@ def run_process(main: Callable[[], None]) -> None:
     if not code:
         threading._shutdown()  # type: ignore[attr-defined]  # waits for threads, as at any end
     atexit._run_exitfuncs()
-    for stream in filter(None, (sys.stdout, sys.stderr)):
+    for stream in (sys.stdout, sys.stderr):
         with contextlib.suppress(BrokenPipeError):
             stream.flush()
     os._exit(code or 0)
@@ -239,25 +239,22 @@ def _one_warning(message: Warning | str, *_: object) -> None:
     print(f"warning: {text}", file=sys.stderr)
 
 
-def _written() -> None:
-    """Writes what waits in standard output, which is None where the shell has closed it."""
-    if sys.stdout is not None:
-        sys.stdout.flush()
-
-
 def _unread() -> bool:
     """Whether nothing reads standard output any more; assumed where the system has no poll, as on Windows."""
-    if sys.stdout is None or not hasattr(select, "poll"):
-        return sys.stdout is not None
+    if not hasattr(select, "poll"):
+        return True
     poll = select.poll()
     poll.register(sys.stdout.fileno(), 0)  # errors are told unasked
     return bool(poll.poll(0))
 
 
-def _encodable() -> None:
-    """Lets streams print a question mark for a character that their encoding lacks, as code pages of Windows do."""
-    for stream in (sys.stdout, sys.stderr):
-        if isinstance(stream, io.TextIOWrapper):
+def _open_streams() -> None:
+    """Gives the streams that the shell has closed a place to write to. All print a question mark for a character that
+    their encoding lacks, as code pages of Windows do."""
+    for name in ("stdout", "stderr"):
+        if getattr(sys, name) is None:
+            setattr(sys, name, open(os.devnull, "w", encoding="utf-8"))
+        if isinstance(stream := getattr(sys, name), io.TextIOWrapper):
             stream.reconfigure(errors="replace")
 
 

@@ -169,8 +169,15 @@ def test_another_pipe_that_breaks_is_no_reader_that_left() -> None:
     assert status == 1 and line.endswith("BrokenPipeError: [Errno 32] Broken pipe\n")
 
 
-def test_no_standard_output_is_no_fault() -> None:
-    assert ended(*doing("import sys; sys.stdout = None; print(1)")) == (0, "")
+@pytest.mark.parametrize(
+    ("action", "status", "line"),
+    [("print(1)", 0, ""), ("parse(RunOptions, '', ['-h'])", 0, ""), ("raise InputError('bad')", 2, "error: bad\n")],
+)
+def test_no_standard_output_is_no_fault(action: str, status: int, line: str) -> None:
+    """As after ``>&-``, where Python starts with None for it."""
+    program = "import sys; sys.stdout = None\nfrom analysis.command.cli import InputError, parse, run_process\n"
+    program += "from analysis.comparison.options import RunOptions\n"
+    assert ended("-c", f"{program}def main():\n    {action}\nrun_process(main)") == (status, line)
 
 
 def test_run_cli_hides_neither_success_nor_faults_of_the_program() -> None:
