@@ -118,9 +118,6 @@ def advantage_figure(
     axis.set_ylabel("adaptive cycles per framed image")
     axis.set_title("Advantage by ledger; below 1 a cycle costs more than an image", fontsize=10, loc="left")
     label_ends(axis)
-    if measured:
-        marks = [line for line in axis.lines if line.get_marker() not in ("", "None")]
-        axis.legend(handles=marks, frameon=False, fontsize=8, loc="upper left")
     return figure
 
 

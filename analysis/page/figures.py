@@ -18,6 +18,8 @@ from matplotlib import rc_context
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from matplotlib.transforms import Affine2D, ScaledTranslation, blended_transform_factory
 from numpy.typing import NDArray
 
 from analysis.storage.files import atomic
@@ -31,7 +33,8 @@ MARKERS = ("o", "s", "^", "D", "v", "P", "X")
 ADAPTIVE, FRAMED, OTHER = INKS[:3]
 GRID = {"color": "0.88", "linewidth": 0.6}
 """Grid lines behind what is plotted."""
-_LINE_PX = 12  # pixels between labels, at the resolution of a figure
+_LINE_PT = 12  # points between labels
+_LEAD_PT = 3, 14, 25  # from the axes to the begin, mark and end of the piece of a line before its label
 
 
 def save(figure: Figure, path: Path, dpi: int = 130) -> None:
@@ -82,28 +85,32 @@ def line_style(style: int) -> dict:
 
 
 def label_ends(axis: Axes) -> None:
-    """Writes the label of every line beside its last point, to the right of the axes, without overlap. The scales of
-    the axes must be final."""
-    figure = axis.figure
+    """Writes the label of every line beside its last point, to the right of the axes, without overlap, after a piece
+    of the line with its mark. The scales of the axes must be final."""
+    figure = axis.get_figure(root=True)
+    assert figure is not None
     known = [line for line in axis.lines if not str(line.get_label()).startswith("_")]
+    axis.get_ylim()  # finds the limits, which positions below follow
     ends = []
     for line in known:
         x, y = (np.asarray(values, np.float64) for values in line.get_data())
         shown = np.isfinite(x) & np.isfinite(y)
         point = (x[shown][-1], y[shown][-1]) if shown.any() else (np.nan, np.nan)
-        ends.append(axis.transData.transform(point)[1] if shown.any() else np.nan)
+        ends.append(line.get_transform().transform(point)[1] if shown.any() else np.nan)
     low, high = axis.transAxes.transform([(0, 0), (1, 1)])[:, 1]
-    apart = _LINE_PX * getattr(figure, "dpi", 100) / 72
-    for line, y in zip(known, spread(ends, apart, low, high), strict=True):
+    points = Affine2D().scale(1 / 72) + figure.dpi_scale_trans
+    edge = ScaledTranslation(1, 0, axis.transAxes)  # type: ignore[arg-type]
+    for line, y in zip(known, spread(ends, _LINE_PT * figure.dpi / 72, low, high), strict=True):
         place = axis.transAxes.inverted().transform((0, y))[1]
         axis.annotate(
-            str(line.get_label()), (1.0, place), (18, 0), xycoords="axes fraction", textcoords="offset points",
-            va="center", fontsize=8, color="0.1", annotation_clip=False,
+            str(line.get_label()), (1.0, place), (_LEAD_PT[-1] + 4, 0), xycoords="axes fraction",
+            textcoords="offset points", va="center", fontsize=8, color="0.1", annotation_clip=False,
         )  # fmt: skip
-        axis.plot(
-            [1.005, 1.022], [place, place], transform=axis.transAxes, clip_on=False, label="_lead",
-            color=line.get_color(), linewidth=line.get_linewidth(), linestyle=line.get_linestyle(),
-        )  # fmt: skip
+        lead = Line2D([], [])
+        lead.update_from(line)
+        lead.set(data=(_LEAD_PT, [place] * len(_LEAD_PT)), markevery=[1], label="_lead", clip_on=False)
+        lead.set_transform(blended_transform_factory(points + edge, axis.transAxes))
+        axis.add_artist(lead)
 
 
 def spread(wanted: Sequence[float], apart: float, low: float, high: float) -> list[float]:

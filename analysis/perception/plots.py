@@ -53,21 +53,21 @@ def psychometric_figure(
 
 def _curve(axis: Axes, part: pd.DataFrame, row: Mapping[str, Any], label: str, style: int, guess: float) -> None:
     """Means over observers with their standard errors, and the fitted function."""
-    ink = INKS[ink_of(style)]
+    ink, mark = INKS[ink_of(style)], MARKERS[style % len(MARKERS)]
     shares = part.pivot_table("correct", "observer", "samples")
     levels = np.asarray(shares.columns, np.float64)
     by_level = [column[np.isfinite(column)] for column in shares.to_numpy(np.float64).T]
     errors = [values.std(ddof=1) / np.sqrt(len(values)) if len(values) > 1 else 0.0 for values in by_level]
     means = [values.mean() for values in by_level]
-    axis.errorbar(levels, means, errors, fmt=MARKERS[style % len(MARKERS)], ms=4, color=ink, capsize=2,
-                  label="_means")  # fmt: skip
+    axis.errorbar(levels, means, errors, fmt=mark, ms=4, color=ink, capsize=2, label="_means")
+    named = {"marker": mark, "ms": 4, "markevery": [], **line_style(style)}  # beside its label the curve has the mark
     if np.isfinite(row.get("mu", np.nan)):
         x = np.geomspace(levels[0], levels[-1], 200)
         jnd = f"{row['jnd']:.0f}" if 0.0 < row["jnd"] < np.inf else str(row["status"])
         shares = correct_share(x, row["mu"], row["sigma"], row["lapse"], guess)
-        axis.plot(x, shares, **line_style(style), label=f"{label}, JND {jnd}")
+        axis.plot(x, shares, **named, label=f"{label}, JND {jnd}")
     else:
-        axis.plot([], [], **line_style(style), label=f"{label}, no fit")
+        axis.plot([], [], **named, label=f"{label}, no fit")
 
 
 def sweep_figure(rows: pd.DataFrame, scenes: Sequence[str]) -> Figure:

@@ -225,10 +225,9 @@ def _line(axis: Axes, lines: Lines, column: str, style: int, name: str) -> None:
         np.array([line[key] for line in lines]) for key in (column, "ratio", "ratio_least", "ratio_most")
     )
     reach = np.maximum([ratio - least, most - ratio], 0.0)
-    axis.errorbar(at, ratio, reach if reach.any() else None, marker=MARKERS[style % len(MARKERS)], markersize=3.5,
-                  capsize=2, label=f"_{name}", **line_style(style))  # fmt: skip
-    axis.plot(at, ratio, label=name, **line_style(style))
+    ink = INKS[ink_of(style)]
+    axis.errorbar(at, ratio, reach if reach.any() else None, fmt="none", color=ink, capsize=2)
+    axis.plot(at, ratio, marker=MARKERS[style % len(MARKERS)], markersize=3.5, label=name, **line_style(style))
     marked = [line for line in lines if line["default"]]
     where, height = ([line[key] for line in marked] for key in (column, "ratio"))
-    axis.plot(where, height, "*", color=INKS[ink_of(style)], markeredgecolor="black", markersize=13, zorder=4,
-              label="_default")  # fmt: skip
+    axis.plot(where, height, "*", color=ink, markeredgecolor="black", markersize=13, zorder=4, label="_default")

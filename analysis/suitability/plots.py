@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import LogLocator
 
 from analysis.metrics.quality import WHISKERS, percentile
-from analysis.page.figures import ADAPTIVE, FRAMED, GRID, INKS, dashed, label_ends, save
+from analysis.page.figures import ADAPTIVE, FRAMED, GRID, INKS, dashed, label_ends, new_figure, save
 from analysis.study.cases import ROWS, Case
 from analysis.study.evaluation import Resources
 from analysis.study.inputs import INPUTS
@@ -182,13 +182,13 @@ def _patch(color: str, hatch: str, label: str) -> Any:
 
 
 def errors(results: Results, name: str) -> Figure | None:
-    """Error over time: bold lines for framed runs, thin lines for adaptive runs, and a column for each resolution."""
+    """Error over time: bold lines for framed runs, thin lines for adaptive runs, and a panel for each resolution."""
     first = results.repetitions[0]
     found = [one for one in results.all if one.run.case.input == name and one.run.repetition == first]
     sides = sorted({one.run.side_px for one in found if one.run.label == "thesis"})
     if not sides:
         return None
-    figure, axes = _axes(max(5.0, 3.6 * len(sides)), 3.6, len(sides), sharey=True)
+    figure, axes = new_figure(8.0, 2.6 * len(sides), len(sides), sharex=True, sharey=True)
     for axis, side in zip(axes, sides, strict=True):
         ours = [one for one in found if one.run.side_px == side and one.run.label == "thesis"]
         ours.sort(key=lambda one: ROWS[one.run.row or 0][0])
@@ -202,16 +202,17 @@ def errors(results: Results, name: str) -> Figure | None:
                 axis.plot(one.times["time_s"], _positive(one.times["mse"]), color=FRAMED, linewidth=2.4, label="framed")
         axis.set_yscale("log")
         axis.set_title(f"{name}, {side}²", loc="left", fontsize=10)
-        axis.set_xlabel("simulated time, s")
+        axis.set_ylabel("mean squared error")
+    axes[-1].set_xlabel("simulated time, s")
+    for axis in axes:
         label_ends(axis)
-    axes[0].set_ylabel("mean squared error")
     return figure
 
 
 def _shade(place: int, count: int) -> Any:
     import matplotlib
 
-    return matplotlib.colormaps["autumn"](0.75 * place / max(count - 1, 1))
+    return matplotlib.colormaps["autumn"](0.6 * place / max(count - 1, 1))
 
 
 def ratio_over_time(results: Results, row: int) -> Figure | None:

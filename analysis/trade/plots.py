@@ -107,11 +107,12 @@ def knobs(table: pd.DataFrame) -> Figure:
         joined = "-" if name != "policy" else ""
         axis.errorbar(x, y, spread, fmt=f"o{joined}", color=ADAPTIVE, markersize=4, linewidth=1.0, capsize=2)
         for number, (value, place) in enumerate(zip(own["value"], zip(x, y, strict=True), strict=True)):
-            weight = "bold" if value == said(KNOBS[name].default) else "normal"
-            left = name == "policy" and number % 2 == 0
+            default = value == said(KNOBS[name].default)  # its label lies below, since others may have its place
+            left = default or (name == "policy" and number % 2 == 0)
             axis.annotate(
-                str(value), place, xytext=(-4 if left else 4, 4), textcoords="offset points", fontweight=weight,
-                fontsize=5.5 if name == "policy" else 7, ha="right" if left else "left",
+                str(value), place, xytext=(-4 if left else 4, -4 if default else 4), textcoords="offset points",
+                fontweight="bold" if default else "normal", fontsize=5.5 if name == "policy" else 7,
+                ha="right" if left else "left", va="top" if default else "baseline",
             )  # fmt: skip
         axis.set_xlim(low, high)
         least, most = min(0.8, own["mse_low"].min() / 1.1), max(1.25, own["mse_high"].max() * 1.15)

@@ -116,5 +116,19 @@ def test_a_figure_is_saved_twice_with_the_same_bytes(figure: Figure, tmp_path: P
         assert picture.size == (520, 390)
 
 
-def test_every_line_has_its_label(figure: Figure) -> None:
-    assert {text.get_text() for text in figure.axes[0].texts} == {"one", "two", "three"}
+def test_every_line_has_its_label_where_it_ends() -> None:
+    """At the scales that are drawn, which matplotlib finds last, after a piece of the line with its dashes and mark."""
+    drawn, (axis,) = new_figure(4.0, 3.0)
+    ends = {"one": 1e-2, "two": 1.0, "three": 1e2}
+    for (style, (name, end)), mark in zip(enumerate(ends.items()), MARKERS, strict=False):
+        axis.loglog([1.0, 9.0], [1.0, end], mark, label=name, **line_style(style))
+    lines = list(axis.lines)
+    label_ends(axis)
+    drawn.canvas.draw()
+    heights = {text.get_text(): axis.transAxes.transform(text.xy)[1] for text in axis.texts}
+    assert heights == pytest.approx(
+        {name: axis.transData.transform((9.0, end))[1] for name, end in ends.items()}, abs=1
+    )
+    for line, lead in zip(lines, axis.lines[3:], strict=True):
+        assert lead.get_transform().transform(lead.get_xydata())[0, 0] > axis.bbox.x1
+        assert (lead.get_marker(), lead._dash_pattern) == (line.get_marker(), line._dash_pattern)
