@@ -127,6 +127,7 @@ def begin() -> None:
     sys.modules["resource"] = None  # type: ignore[assignment]
     builtins.open, io.open = open_as_text(_builtin_open), open_as_text(_io_open)
     os.open, os.fsync, os.rename = opened_file, flushed, rename_to_new
+    os.linesep = "\r\n"
     shutil._use_fd_functions = False  # type: ignore[attr-defined]
     tempfile.TemporaryFile = tempfile.NamedTemporaryFile  # type: ignore[assignment,misc]
     sys.addaudithook(audit)

@@ -33,6 +33,14 @@ def run(*command: str, folder: Path, rules: bool = True) -> subprocess.Completed
     )
 
 
+def changed_ends(folder: Path) -> list[Path]:
+    """Files of text whose lines end as on Windows."""
+    kinds = {".csv", ".html", ".json", ".md", ".svg"}
+    texts = [file for file in folder.rglob("*") if file.suffix in kinds]
+    assert texts
+    return [file for file in texts if b"\r\n" in file.read_bytes()]
+
+
 def script(name: str, *arguments: str, folder: Path, rules: bool = True) -> str:
     done = run(str(ROOT / "scripts" / name), *arguments, folder=folder, rules=rules)
     assert done.returncode == 0, done.stderr
@@ -78,6 +86,7 @@ def test_a_run_has_the_same_files(tmp_path: Path) -> None:
         assert f"look at it: {(folder / 'one' / 'report.html').as_uri()}" in shown
     found = compare_folders(tmp_path / "there", tmp_path / "here")
     assert found.compared >= 3 and not found.found, found.found
+    assert not changed_ends(tmp_path / "there")
 
 
 def test_scenes_are_converted_to_the_same_bytes(tmp_path: Path) -> None:
@@ -114,6 +123,7 @@ def test_a_study_of_two_processes_has_the_same_tables(tmp_path: Path) -> None:
     found = compare_folders(tmp_path / "there", tmp_path / "here", ("seconds", "references"))
     assert names["there"] == names["here"] and len(names["here"]) == 5
     assert found.compared > 20 and not found.found, found.found
+    assert not changed_ends(tmp_path / "there")
 
 
 @pytest.mark.slow
@@ -121,6 +131,38 @@ def test_stimuli_and_answers(tmp_path: Path) -> None:
     script("perception.py", "stimuli", "--width-px", "16", "--frames", "1", "--out", "stimuli", folder=tmp_path)
     script("perception.py", "simulate", "stimuli", "--observers", "2", "--out", "answers", folder=tmp_path)
     assert (tmp_path / "answers" / "trials-simulated.parquet").is_file()
+
+
+@pytest.mark.parametrize(
+    ("begin", "hold"),
+    [
+        ("from analysis.command.ownership import own_folder, release_folders", "own_folder(held, 'out')"),
+        (
+            "import types, warp; from renderer.compute.device import _one_process\n"
+            "warp.config.quiet, warp.config.kernel_cache_dir = True, str(held)",
+            "with _one_process(types.ModuleType('empty')):",
+        ),
+    ],
+    ids=("of a folder", "of a compiler"),
+)
+def test_locks_are_removed_when_they_are_closed(begin: str, hold: str, tmp_path: Path) -> None:
+    shown = "print(*(file.suffix or file.name for file in held.iterdir()))"
+    held = f"{hold}\n    {shown}" if hold.endswith(":") else f"{hold}\n{shown}\nrelease_folders()"
+    done = run("-c", f"from pathlib import Path; held = Path('held')\n{begin}\n{held}\n{shown}", folder=tmp_path)
+    assert done.returncode == 0 and done.stdout.split("\n")[0] in (".owner", ".lock"), done.stderr
+    assert not list((tmp_path / "held").iterdir())
+
+
+def test_a_scene_on_another_drive_has_its_whole_path(monkeypatch: pytest.MonkeyPatch) -> None:
+    from analysis.live import engine
+
+    assert engine._from(Path("/a/b"), Path("/a/c.xml")) == "../c.xml"
+
+    def relpath(path: Path, start: Path) -> str:
+        raise ValueError("path is on mount 'D:', start on mount 'C:'")
+
+    monkeypatch.setattr(os.path, "relpath", relpath)
+    assert engine._from(Path("/a/b"), Path("/a/c.xml")) == "/a/c.xml"
 
 
 class Locked(io.BytesIO):
