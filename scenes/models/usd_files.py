@@ -43,10 +43,11 @@ from scenes.models.usd_views import LAMP, camera_of, glow_of, light_of
 _GREY = 0.18
 _ADDRESS = re.compile(r"anon:0x[0-9a-fA-F]+:?")
 _NESTED = re.compile(
-    rb'"""(?s:.*?)"""|"(?:\\.|[^"\\\n])*"|\'(?:\\.|[^\'\\\n])*\'|#[^\n]*|@[^@\n]*@'
-    rb"|[=:]\s*\[(?:[\s\d.,()einfaE+-]|#[^\n]*)*(\[)"
+    rb'"""(?s:.*?)"""|"(?:\\.|[^"\\\n])*+"|\'(?:\\.|[^\'\\\n])*+\'|#[^\n]*|@[^@\n]*@'
+    rb"|[=:]\s*\[(?:[\s\d.,()einfaE+-]|#[^\n]*)*+(\[)"
 )
-"""Strings, comments and files of USD text, and numbers in which a further list begins."""
+"""Strings, comments and files of USD text, and numbers in which a further list begins. Repetitions are possessive: others
+take 100 bytes of memory for each byte."""
 
 _RULE = re.compile(r" matching pxrInternal.*?(?= at ')")  # of OpenUSD's grammar
 _SAID_MOST = 200  # characters of a message, which may quote the rest of the file
@@ -86,9 +87,9 @@ def _refuse_nested(sources: Sources) -> None:
     Raises:
         SceneError: there is one.
     """
-    content = sources.path.read_bytes()
-    found = _NESTED.finditer(content) if content.startswith(b"#usda") else iter(())
-    at = next((one.start(1) for one in found if one[1]), None)
+    with sources.path.open("rb") as file:
+        content = file.read() if file.peek(5)[:5] == b"#usda" else b""  # binary files may be large
+    at = next((one.start(1) for one in _NESTED.finditer(content) if one[1]), None)
     if at is not None:
         line, column = content.count(b"\n", 0, at) + 1, at - content.rfind(b"\n", 0, at)
         raise SceneError(f"cannot be read: {line}:{column}: expected numbers, got a list within a list")
