@@ -46,8 +46,8 @@ _NESTED = re.compile(
     rb'"""(?s:.*?)"""|"(?:\\.|[^"\\\n])*+"|\'(?:\\.|[^\'\\\n])*+\'|#[^\n]*|@[^@\n]*@'
     rb"|[=:]\s*\[(?:[\s\d.,()einfaE+-]|#[^\n]*)*+(\[)"
 )
-"""Strings, comments and files of USD text, and numbers in which a further list begins. Repetitions are possessive: others
-take 100 bytes of memory for each byte."""
+"""Strings, comments and files of USD text, and numbers in which a further list begins. Repetitions are possessive:
+others take 100 bytes of memory for each byte."""
 
 _RULE = re.compile(r" matching pxrInternal.*?(?= at ')")  # of OpenUSD's grammar
 _SAID_MOST = 200  # characters of a message, which may quote the rest of the file
@@ -88,7 +88,9 @@ def _refuse_nested(sources: Sources) -> None:
         SceneError: there is one.
     """
     with sources.path.open("rb") as file:
-        content = file.read() if file.peek(5)[:5] == b"#usda" else b""  # binary files may be large
+        if file.read(5) != b"#usda":
+            return
+    content = sources.path.read_bytes()
     at = next((one.start(1) for one in _NESTED.finditer(content) if one[1]), None)
     if at is not None:
         line, column = content.count(b"\n", 0, at) + 1, at - content.rfind(b"\n", 0, at)
