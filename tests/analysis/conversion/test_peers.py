@@ -26,10 +26,10 @@ def test_pictures_of_one_start_are_those_of_single_ones(
     files[0][0].write_text("Nonsense")
     for (file, _), name in zip(files[1:], ("point", "lamp, sphere"), strict=True):
         save_scene_file(lamp(name).scene, file, to)
-    found = drawn(program, files, (24, 24), 64, 100.0)
+    found = drawn(program, files, (24, 24), 1024, 100.0)
     assert set(found) == {out for _, out in files[1:]}
     for file, out in files[1:]:
-        single = rendered(program, file, tmp_path / "single.npy", (24, 24), 64, 100.0)
+        single = rendered(program, file, tmp_path / "single.npy", (24, 24), 1024, 100.0)
         assert not isinstance(single, str), single
         np.testing.assert_allclose(found[out].mean(axis=(0, 1)), single.mean(axis=(0, 1)), rtol=0.03)
 
