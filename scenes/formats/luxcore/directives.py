@@ -52,7 +52,7 @@ def parameters(block: Block, textures: Container[str], names: Mapping[str, str] 
 
 def _parameter(rest: str, found: Property, textures: Container[str], names: Mapping[str, str]) -> list[Values]:
     name = names.get(rest, rest)
-    if rest == "multibounce":
+    if rest in ("multibounce", "normalize"):
         return [(f"bool {name}",), (str(found.word() in ("1", "true")).lower(),)]
     if rest in TEXTS:
         return texts(**{name: found.word()})

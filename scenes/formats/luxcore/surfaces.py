@@ -7,9 +7,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from scenes.canonical import Masked, Material, MetallicRough
-from scenes.formats.appearance.folding import mean_of
+from scenes.canonical import ConstantTexture, Masked, Material, MetallicRough, Texture
+from scenes.formats.appearance.folding import mean_of, product_of
 from scenes.formats.appearance.spectra import grey
+from scenes.formats.directives.names import Of
 from scenes.formats.directives.surfaces import Maker
 from scenes.formats.directives.syntax import Parameters
 from scenes.formats.luxrender.read_materials import LuxSurfaces
@@ -36,6 +37,11 @@ DEFAULTS: dict[str, dict[str, tuple[float, ...]]] = {
 """Defaults that are not LuxRender's."""
 
 
+_BLACKBODY = 89_160.0
+"""Ratio of LuxCore 2.10's black bodies to those of ``normalize``, whose spectrum is at most 1 (measured at 2000, 3000
+and 6500 K)."""
+
+
 class LuxCoreSurfaces(LuxSurfaces):
     """Reader of textures and materials of LuxCore."""
 
@@ -53,6 +59,12 @@ class LuxCoreSurfaces(LuxSurfaces):
 
     def material(self, kind: str, parameters: Parameters) -> Material:
         return self.masked(super().material(kind, parameters), parameters)
+
+    def made_texture(self, kind: str, parameters: Parameters, of: Of) -> Texture:
+        made = super().made_texture(kind, parameters, of)
+        if kind != "blackbody" or parameters.truth("normalize", False):
+            return made
+        return product_of(made, ConstantTexture(grey(_BLACKBODY)))
 
     def _disney(self, parameters: Parameters) -> Material:
         where = str(parameters.place)

@@ -241,6 +241,16 @@ def test_power_of_lamps_is_spread_over_their_area(tmp_path: Path) -> None:
     assert scene.instances[0].emission == pytest.approx((1700.0 / (2.0 * math.pi),) * 3, rel=1e-4)
 
 
+@pytest.mark.parametrize(
+    ("more", "luxcore"), [("", (69149.0, 32152.0, 10691.0)), ("normalize = true", (0.77556, 0.36061, 0.11991))]
+)
+def test_lamps_that_are_black_bodies(more: str, luxcore: tuple[float, ...], tmp_path: Path) -> None:
+    """The radiance of 3000 K that LuxCore 2.10 draws."""
+    lamp = "scene.textures.t.type = blackbody\nscene.textures.t.temperature = 3000\nscene.materials.m.emission = t\n"
+    scene, report = scene_of(tmp_path, CAMERA + lamp + (f"scene.textures.t.{more}\n" if more else "") + SQUARE)
+    assert scene.instances[0].emission == pytest.approx(luxcore, rel=0.06) and not report.losses
+
+
 def test_volumes(tmp_path: Path) -> None:
     text = (
         "scene.volumes.v.type = homogeneous\nscene.volumes.v.absorption = 0.1 0.2 0.3\n"
