@@ -88,7 +88,8 @@ np.save(out, np.array(mi.render(scene, spp=samples, seed=seed))[..., :3])
 # LuxCore's pictures begin with the bottom row, and are one row too low: it takes the ray of row y from
 # height - y - 1, not from height - y. The missing row at the bottom repeats the row above it. LuxCore 2.10 knows
 # scattering volumes of these files by another spelling than LuxRender, which it then refuses itself, and once scattered
-# light alone. File names of LuxCore's own scenes are relative to a folder above theirs.
+# light alone. File names of LuxCore's own scenes are relative to a folder above theirs. A thread that waits for a core may
+# leave its pixels without samples for some passes; the picture is taken after all have some, unless it is cropped.
 _LUXCORE = """
 import os, sys, time, numpy as np
 import pyluxcore as lux  # after NumPy: its allocator stops a later import
@@ -118,17 +119,20 @@ for name in list(what.GetAllNames()):
 for name in list(how.GetAllNames()):
     if name.startswith("film.imagepipeline"):
         how.Delete(name)
-for name, value in {"renderengine.type": "PATHCPU", "sampler.type": "SOBOL", "batch.haltspp": samples,
+for name, value in {"renderengine.type": "PATHCPU", "sampler.type": "SOBOL", "batch.haltspp": 4 * samples + 64,
                     "film.width": width, "film.height": height, "film.filter.type": "NONE",
+                    "film.outputs.1.type": "SAMPLECOUNT", "film.outputs.1.filename": "counts.exr",
                     "renderengine.seed": seed + 1}.items():
     how.Set(lux.Property(name, value))
 scene = lux.Scene()
 scene.Parse(what)
 session = lux.RenderSession(lux.RenderConfig(how, scene))
 session.Start()
-while not session.HasDone():
+counts = np.zeros((height, width), np.uint32)
+while not session.HasDone() and (counts.mean() < samples or not counts.all()):
     time.sleep(0.02)
     session.UpdateStats()
+    session.GetFilm().GetOutputUInt(lux.FilmOutputType.SAMPLECOUNT, counts, 0)
 session.Stop()
 pixels = np.zeros((height, width, 3), np.float32)
 session.GetFilm().GetOutputFloat(lux.FilmOutputType.RGB, pixels, 0)
