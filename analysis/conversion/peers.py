@@ -88,8 +88,8 @@ np.save(out, np.array(mi.render(scene, spp=samples, seed=seed))[..., :3])
 # LuxCore's pictures begin with the bottom row, and are one row too low: it takes the ray of row y from
 # height - y - 1, not from height - y. The missing row at the bottom repeats the row above it. LuxCore 2.10 knows
 # scattering volumes of these files by another spelling than LuxRender, which it then refuses itself, and once scattered
-# light alone. File names of LuxCore's own scenes are relative to a folder above theirs. A thread that waits for a core may
-# leave its pixels without samples for some passes; the picture is taken after all have some, unless it is cropped.
+# light alone. File names of LuxCore's own scenes are relative to a folder above theirs. A thread that waits for a core
+# may leave its pixels without samples for some passes; the picture is taken after all have some, unless it is cropped.
 _LUXCORE = """
 import os, sys, time, numpy as np
 import pyluxcore as lux  # after NumPy: its allocator stops a later import
