@@ -4,7 +4,8 @@ All textures of a material must have the coordinates of its first one; others ar
 maps are not needed, because path tracing computes the light between surfaces.
 
 Source: Khronos Group, "glTF 2.0 specification", section 3.9 and appendix B; extensions KHR_materials_clearcoat,
-KHR_materials_emissive_strength, KHR_materials_ior, KHR_materials_specular, KHR_materials_unlit.
+KHR_materials_emissive_strength, KHR_materials_ior, KHR_materials_specular, KHR_materials_transmission,
+KHR_materials_unlit, KHR_materials_volume.
 """
 
 from __future__ import annotations
@@ -14,8 +15,22 @@ from typing import Any
 
 import numpy as np
 
-from scenes.canonical import ConstantTexture, Emissive, Masked, Material, MetallicRough, NormalMapped, Texture
-from scenes.formats.appearance.spectra import rgb
+from scenes.canonical import (
+    ConstantTexture,
+    Emissive,
+    Glass,
+    Masked,
+    Material,
+    Medium,
+    MetallicRough,
+    MixMaterial,
+    NormalMapped,
+    Texture,
+)
+from scenes.formats.appearance.attenuation import LEAST, medium_of
+from scenes.formats.appearance.folding import mean_of
+from scenes.formats.appearance.mixtures import NOTHING
+from scenes.formats.appearance.spectra import grey, rgb
 from scenes.formats.losses import LossReport
 from scenes.models.gltf_textures import Lookup, Textures, lookup_of
 
@@ -80,11 +95,63 @@ class FacetMaterials:
             shining = MetallicRough(_BLACK, 0.0, rough, ior=1.0, emission=found.emission)
             if given.get("doubleSided", False) and max(found.emission) > 0.0 and found == shining:
                 found = Emissive(found.emission)
+            elif _through(extensions):
+                found = self._clear(given, found, where)
         normal = pictures.get("normalTexture")
         if normal is not None:
             scale = float(given["normalTexture"].get("scale", 1.0))
             found = NormalMapped(found, self._picture(normal, where, numbers=True), scale)
         return self._with_holes(given, found, shared, where)
+
+    def medium(self, given: dict[str, Any], where: str) -> Medium | None:
+        """The medium within a surface that light passes, if it has a volume.
+
+        Its border is the mesh, as for every path tracer: the thickness of the format, an estimate for renderers that
+        do not follow light, tells only whether there is a volume.
+        """
+        extensions = given.get("extensions", {})
+        volume = extensions.get("KHR_materials_volume", {})
+        if not (_through(extensions) and volume.get("thicknessFactor", 0.0) > 0.0):
+            return None
+        color, distance = rgb(volume.get("attenuationColor", (1.0, 1.0, 1.0))), volume.get("attenuationDistance")
+        if distance is not None and distance <= 0.0:
+            self.report.add(where, f"an attenuation distance of {distance:g}", "no absorption")
+        if not LEAST <= min(color) <= max(color) <= 1.0 and distance is not None:
+            self.report.add(where, "a colour of absorption below 1e-08 or above 1", "the nearest between them")
+        return None if distance is None else medium_of(color, distance)
+
+    def _clear(self, given: dict[str, Any], solid: MetallicRough, where: str) -> Material:
+        """A surface of which the part that is no metal lets light through, in whole or in part: a mixture with glass of
+        the same facets."""
+        extensions = given["extensions"]
+        through = extensions["KHR_materials_transmission"]
+        lookup = lookup_of(through.get("transmissionTexture"))
+        share = _through(extensions)
+        if lookup is not None:
+            self.report.add(where, "a texture of the light that passes", "its mean")
+            share *= float(self.textures.picture(lookup, numbers=True)[..., 0].mean(dtype=np.float64))
+        metallic, roughness = solid.metallic, solid.roughness
+        if solid.parts is not None:
+            self.report.add(where, "a texture of the roughness of glass", "its mean")
+            _, green, blue = mean_of(solid.parts)
+            metallic, roughness = metallic * min(blue, 1.0), roughness * min(green, 1.0)
+        if max(solid.emission) > 0.0:
+            self.report.add(where, "light of a surface that lets light through")
+        thin = not extensions.get("KHR_materials_volume", {}).get("thicknessFactor", 0.0) > 0.0
+        if thin and roughness > 0.0:
+            self.report.add(where, "a rough pane", "a clear one")
+        if solid.coat > 0.0:
+            self.report.add(where, "a clear coat on glass")
+        alpha = 0.0 if thin else roughness**2
+        glass = Glass(transmittance=solid.base, ior=solid.ior, roughness=(alpha, alpha), thin=thin)
+        share *= 1.0 - metallic
+        if share >= 1.0:
+            unseen = glass == Glass(ior=1.0) and self.medium(given, where) is not None
+            return NOTHING if unseen else glass
+        if share <= 0.0:
+            return solid
+        rest = MetallicRough(solid.base, metallic / (1.0 - share), roughness, ior=solid.ior)
+        return MixMaterial(rest, glass, ConstantTexture(grey(share)))
 
     def _index(self, extensions: dict[str, Any], where: str) -> float:
         """The refractive index; 1 for a dielectric without reflection (a specular factor of 0)."""
@@ -118,6 +185,12 @@ class FacetMaterials:
             )
         opacity = self.textures.texture(lookup, self.textures.opacity(lookup) * factor, where)
         return Masked(material, opacity, cutoff)
+
+
+def _through(extensions: dict[str, Any]) -> float:
+    """The share of the light that passes."""
+    factor = extensions.get("KHR_materials_transmission", {}).get("transmissionFactor", 0.0)
+    return float(np.clip(factor, 0.0, 1.0))
 
 
 PARTS = ("metallic", "roughness")

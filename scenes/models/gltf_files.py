@@ -11,11 +11,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scenes.arithmetic import product
-from scenes.canonical import Instance, Light, Material, Matrix, Mesh, RigidTrack, SceneError
+from scenes.canonical import Instance, Light, Matrix, Mesh, RigidTrack, SceneError
 from scenes.canonical.values import vertices_of
 from scenes.formats.losses import LossReport
 from scenes.models.gltf_data import GltfData
-from scenes.models.gltf_materials import GltfMaterials
+from scenes.models.gltf_materials import GltfMaterials, Painted
 from scenes.models.gltf_motion import GltfMotion, local_poses
 from scenes.models.gltf_skins import bends, bent, joint_matrices
 from scenes.models.gltf_textures import GltfTextures
@@ -30,7 +30,7 @@ _KINDS = {0: "points", 1: "lines", 2: "lines", 3: "lines"}
 _READ = {"KHR_mesh_quantization", "KHR_texture_transform", "EXT_texture_webp", "KHR_lights_punctual"}
 _TYPES = {"NORMAL": ("VEC3",), "TEXCOORD": ("VEC2",), "COLOR": ("VEC3", "VEC4")}
 _DEPTH_MAX = 256
-_Part = tuple[Mesh, Material, bool]
+_Part = tuple[Mesh, Painted, bool]
 """A mesh, its material, and whether its back is drawn, too."""
 
 
@@ -205,11 +205,11 @@ class _Reader:
         )
         if normals is None and painted.uvs is None:
             mesh = Mesh(vertices_of(points), faces.astype(np.int32), source=str(self.data.sources.path))
-            return mesh, painted.material, doubled
+            return mesh, painted, doubled
         shading = None if normals is None else unit_normals(normals[faces], points[faces])
         source = str(self.data.sources.path)
         mesh = with_corners(points[faces], shading, painted.uvs, source, None if painted.baked else faces)
-        return mesh, painted.material, doubled
+        return mesh, painted, doubled
 
     def _of_vertices(
         self, attribute: str, attributes: dict[str, Any], count: int, place: str
@@ -225,8 +225,9 @@ class _Reader:
 
 
 def _placed(part: _Part, matrix: Matrix, track: RigidTrack | None, name: str) -> Instance:
-    mesh, material, doubled = part
-    return Instance(mesh, material, matrix, track, name, emission_twosided=doubled)
+    mesh, painted, doubled = part
+    look = {"emission_twosided": doubled, "interior": painted.medium}
+    return Instance(mesh, painted.material, matrix, track, name, **look)
 
 
 def _triangles(order: NDArray[np.int64], mode: int) -> NDArray[np.int64]:

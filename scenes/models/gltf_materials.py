@@ -17,7 +17,7 @@ import numpy as np
 from jaxtyping import Float
 from numpy.typing import NDArray
 
-from scenes.canonical import ConstantTexture, Emissive, Glass, Material, Phong, Texture
+from scenes.canonical import ConstantTexture, Emissive, Glass, Material, Medium, Phong, Texture
 from scenes.formats.appearance.folding import mean_of
 from scenes.formats.appearance.spectra import rgb
 from scenes.formats.losses import LossReport
@@ -40,11 +40,13 @@ class Painted:
         material: material of all triangles.
         uvs: texture coordinates of their corners; None without texture.
         baked: whether the texture holds the colours of the corners, so that each triangle has its own coordinates.
+        medium: medium within glass, for path tracing.
     """
 
     material: Material
     uvs: Float[NDArray[np.float32], "f 3 2"] | None
     baked: bool = False
+    medium: Medium | None = None
 
 
 class GltfMaterials:
@@ -88,12 +90,14 @@ class GltfMaterials:
             shared = next((one for _, one in lookups_beside(given) if one.coordinates in sets), None)
         if shared is not None:
             uvs = shared.moved(sets[shared.coordinates]).astype(np.float32)
+        medium = None if self._facets is None else self._facets.medium(given, where)
         if tint is not None:
-            return Painted(self._material(given, where, lookup, tint, shared), uvs, shared is None and uvs is not None)
+            made = self._material(given, where, lookup, tint, shared)
+            return Painted(made, uvs, shared is None and uvs is not None, medium)
         key = -1 if number is None else number
         if key not in self._made or (lookup is None) != (lookup_of(_rough(given).get("baseColorTexture")) is None):
             self._made[key] = self._material(given, where, lookup, None, shared)
-        return Painted(self._made[key], uvs)
+        return Painted(self._made[key], uvs, medium=medium)
 
     def _material(
         self, given: dict[str, Any], where: str, lookup: Lookup | None, tint: Texture | None, shared: Lookup | None
@@ -107,15 +111,19 @@ class GltfMaterials:
             if name in given:
                 self.report.add(where, name)
         base = self._base(given, where, lookup, tint)
-        through = extensions.get("KHR_materials_transmission", {})
-        if self._facets is not None and through.get("transmissionFactor", 0.0) <= 0.5:
+        if self._facets is not None:
             return self._facets.material(given, base, shared, where)
         if "KHR_materials_unlit" in extensions:
             if isinstance(base, ConstantTexture):
                 return Emissive(base.value)
             self.report.add(where, "a surface without lighting", "a diffuse one")
             return Phong(base)
-        if through.get("transmissionFactor", 0.0) > 0.5:
+        through = extensions.get("KHR_materials_transmission", {})
+        metallic = float(np.clip(_rough(given).get("metallicFactor", 1.0), 0.0, 1.0))
+        share = float(np.clip(through.get("transmissionFactor", 0.0), 0.0, 1.0)) * (1.0 - metallic)
+        if 0.0 < share < 1.0 or (share > 0.0 and "transmissionTexture" in through):
+            self.report.add(where, "light that passes in part", "glass" if share > 0.5 else "an opaque surface")
+        if share > 0.5:
             return self._glass(given, base, extensions, where)
         material = self._rough(given, base, where, lookup)
         mode = given.get("alphaMode", "OPAQUE")
@@ -162,20 +170,15 @@ class GltfMaterials:
         return metallic_rough(base, diffuse, metallic, roughness)
 
     def _glass(self, given: dict[str, Any], base: Texture, extensions: dict[str, Any], where: str) -> Material:
-        """Glass of the mean base colour, thin unless it has a volume; for path tracing with its roughness."""
+        """Clear glass of the mean base colour, thin unless it has a volume."""
         volume = extensions.get("KHR_materials_volume", {})
-        thickness = volume.get("thicknessFactor", 0.0)
         if any(part != 1.0 for part in volume.get("attenuationColor", ())):
             self.report.add(where, "absorption in glass")
-        if "metallicRoughnessTexture" in _rough(given):
-            self.report.add(where, "a texture of the roughness of glass", "its factor")
         ior = float(extensions.get("KHR_materials_ior", {}).get("ior", 1.5))
         if not isinstance(base, ConstantTexture):
             self.report.add(where, "a texture of glass", "its mean")
-        color = rgb(np.clip(mean_of(base), 0.0, 1.0))
-        alpha = float(np.clip(_rough(given).get("roughnessFactor", 1.0), 0.0, 1.0)) ** 2
-        rough = (alpha, alpha) if self._facets is not None and thickness > 0.0 else (0.0, 0.0)
-        return Glass(transmittance=ConstantTexture(color), ior=max(ior, 1.0), roughness=rough, thin=not thickness > 0.0)
+        color = ConstantTexture(rgb(np.clip(mean_of(base), 0.0, 1.0)))
+        return Glass(transmittance=color, ior=max(ior, 1.0), thin=not volume.get("thicknessFactor", 0.0) > 0.0)
 
     def _glowing(self, given: dict[str, Any], material: Material, where: str) -> Material:
         strength = given.get("extensions", {}).get("KHR_materials_emissive_strength", {}).get("emissiveStrength", 1.0)

@@ -80,9 +80,11 @@ class Records:
             KHR_materials_emissive_strength=strength,
             KHR_materials_ior=record(ior=number),
             KHR_materials_specular=record(specularFactor=number),
-            KHR_materials_transmission=record(transmissionFactor=number),
+            KHR_materials_transmission=record(transmissionFactor=number, transmissionTexture=info[""]),
             KHR_materials_unlit=record(),
-            KHR_materials_volume=record(thicknessFactor=number, attenuationColor=numbers(3)),
+            KHR_materials_volume=record(
+                thicknessFactor=number, attenuationColor=numbers(3), attenuationDistance=number
+            ),
         )
         material = record(
             name=text, pbrMetallicRoughness=rough, normalTexture=info["scaled"], emissiveTexture=info[""],

@@ -93,6 +93,7 @@ class UsdMaterials:
             if str(self._constant(shader, "opacityMode") or "transparent") == "transparent":
                 made["extensions"] |= {"KHR_materials_transmission": {"transmissionFactor": 1.0},
                                        "KHR_materials_volume": {"thicknessFactor": 1.0}}  # fmt: skip
+                del made["alphaMode"]
         return made, colors
 
     def _as_gltf(self, given: dict[str, Any], where: str) -> tuple[dict[str, Any], str]:

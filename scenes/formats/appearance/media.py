@@ -6,7 +6,7 @@ import dataclasses
 
 import numpy as np
 
-from scenes.canonical import Instance, Medium, Rgb, Scene, SceneError
+from scenes.canonical import Glass, Instance, Medium, Rgb, Scene, SceneError
 from scenes.formats.appearance.mixtures import is_nothing
 from scenes.formats.appearance.spectra import rgb
 from scenes.formats.losses import LossReport
@@ -36,12 +36,33 @@ def media_of(scene: Scene) -> list[Medium]:
     return list(dict.fromkeys(medium for medium in found if medium is not None))
 
 
-def without_media(scene: Scene, report: LossReport) -> Scene:
-    """The scene without media and without invisible surfaces, for formats that have neither; media are reported."""
+def without_media(scene: Scene, report: LossReport, within_glass: bool = False) -> Scene:
+    """The scene without media and without invisible surfaces, for formats that have neither; media are reported, except
+    those ``within_glass``, which can be kept."""
     if scene.medium is not None:
         report.add("camera", f"a medium around the camera ({_named(scene.medium)})")
-    kept = tuple(bare for one in scene.instances if (bare := _bare(one, report)) is not None)
+    kept = tuple(bare for one in scene.instances if (bare := _bare(one, report, within_glass)) is not None)
     return dataclasses.replace(scene, instances=kept, medium=None)
+
+
+def absorbing_within(scene: Scene, report: LossReport) -> Scene:
+    """The scene with the media that absorb within glass, for formats that have no others; these are reported.
+
+    An invisible surface about such a medium becomes glass of the index 1, which is invisible, too.
+    """
+    clear = Glass(ior=1.0)
+    kept = []
+    for one in scene.instances:
+        if one.interior is None or not (is_nothing(one.material) or _solid(one)) or one.emission is not None:
+            kept.append(one)
+            continue
+        medium = filled(Medium(one.interior.absorption))
+        if one.interior.scatters:
+            became = "left out" if medium is None else "its absorption alone"
+            report.add(one.name or "shape", "a medium inside a surface (scattering)", became)
+        material = clear if is_nothing(one.material) and medium is not None else one.material
+        kept.append(dataclasses.replace(one, material=material, interior=medium))
+    return without_media(dataclasses.replace(scene, instances=tuple(kept)), report, within_glass=True)
 
 
 def as_drawn_by(scene: Scene, integrator: str, where: str, report: LossReport) -> Scene:
@@ -52,16 +73,21 @@ def as_drawn_by(scene: Scene, integrator: str, where: str, report: LossReport) -
     return without_media(scene, LossReport())
 
 
-def _bare(instance: Instance, report: LossReport) -> Instance | None:
+def _bare(instance: Instance, report: LossReport, within_glass: bool) -> Instance | None:
     where = instance.name or "shape"
-    for side, medium in (("inside", instance.interior), ("outside", instance.exterior)):
+    kept = instance.interior if within_glass and _solid(instance) and instance.emission is None else None
+    for side, medium in (("inside", None if kept else instance.interior), ("outside", instance.exterior)):
         if medium is not None:
             report.add(where, f"a medium {side} a surface ({_named(medium)})")
     if is_nothing(instance.material) and instance.emission is None:
         return None
-    if instance.interior is None and instance.exterior is None:
+    if instance.interior is kept and instance.exterior is None:
         return instance
-    return dataclasses.replace(instance, interior=None, exterior=None)
+    return dataclasses.replace(instance, interior=kept, exterior=None)
+
+
+def _solid(instance: Instance) -> bool:
+    return isinstance(instance.material, Glass) and not instance.material.thin
 
 
 def _named(medium: Medium) -> str:

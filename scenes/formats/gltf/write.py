@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field
+from functools import partial
 
 import numpy as np
 
@@ -37,13 +38,14 @@ from scenes.canonical import (
 )
 from scenes.canonical.values import Matrix, Rgb, RigidTrack
 from scenes.daylight import sun_light
-from scenes.formats.appearance.media import without_media
+from scenes.formats.appearance.media import absorbing_within
 from scenes.formats.appearance.spot_profiles import reshaped
+from scenes.formats.geometry.bodies import Body, bodies_of
 from scenes.formats.geometry.conventions import FAR
 from scenes.formats.geometry.meshed import about_middle, as_mesh, depends_on_uv, rectangle_mesh, shape_name
 from scenes.formats.geometry.placing import facing, has_two_sides, keys_from_zero, lose_undrawn_back, shines
 from scenes.formats.gltf.document import INDICES, VERTICES, Document, Json
-from scenes.formats.gltf.write_materials import GltfMaterialWriter
+from scenes.formats.gltf.write_materials import GltfMaterialWriter, Look
 from scenes.formats.losses import LossReport, without_settings
 from scenes.formats.text.output import Output
 from scenes.viewing import turned_up
@@ -51,6 +53,7 @@ from scenes.viewing import turned_up
 _NEAR, _SHARP_RAD = 1e-3, 1e-6
 _LEVEL = 1e-3  # that a camera must be nearer to z upwards, so that a turned scene is not turned again
 _SPARSE = np.iinfo(np.uint16).max
+_Part = tuple[Mesh, Look]
 
 
 @dataclass
@@ -69,10 +72,13 @@ class GltfWriter:
 
     def write(self, scene: Scene) -> None:
         """Writes a scene."""
-        scene = without_media(scene, self.report)
+        scene = absorbing_within(scene, self.report)
         self._camera(scene.camera, scene.film)
-        for number, instance in enumerate(scene.instances):
-            self._instance(instance, instance.name.rpartition("/")[2] or f"{type(instance.shape).__name__}{number}")
+        number = 0
+        for body in bodies_of(scene.instances, lambda first, second: True):
+            name = body[0].name.rpartition("/")[2] or f"{type(body[0].shape).__name__}{number}"
+            self._body(body, name)
+            number += len(body)
         for light in scene.lights:
             self._light(light)
         without_settings(scene, self.report)
@@ -142,32 +148,34 @@ class GltfWriter:
 
     # --- shapes ------------------------------------------------------------------------------------------------------
 
-    def _instance(self, instance: Instance, name: str) -> None:
-        shape, both_sides = instance.shape, has_two_sides(instance)
+    def _part(self, instance: Instance, name: str) -> _Part:
+        """The mesh and the look of an instance."""
+        shape = instance.shape
         lose_undrawn_back(instance, name, self.report)
         if isinstance(shape, Disk | Sphere | Curves):
             became = f"a mesh of {len(as_mesh(shape).faces)} triangles"
             self.report.add(name, shape_name(shape), became)
         mesh = rectangle_mesh() if isinstance(shape, Rectangle) else as_mesh(shape)
         emission = instance.emission if shines(instance) and not isinstance(instance.material, Emissive) else None
-        key = "mesh", id(mesh), id(instance.material), emission, both_sides
-        number, middle = self.document.once(
-            key, (mesh, instance.material), lambda: self._mesh(instance, mesh, emission, both_sides, name)
-        )
-        matrix = instance.to_world
-        if middle is not None:
-            matrix = product(matrix, middle)
-        self._place({"name": name, "mesh": number}, matrix, instance.track)
+        return mesh, Look(instance.material, emission, has_two_sides(instance), instance.interior)
 
-    def _mesh(
-        self, instance: Instance, mesh: Mesh, emission: Rgb | None, both_sides: bool, name: str
-    ) -> tuple[int, Matrix | None]:
-        """The index of a mesh with its material, and the place of its origin if that was moved."""
-        textured = mesh.uvs is not None and depends_on_uv(instance.material)
-        key = "geometry", id(mesh), textured
-        geometry, middle = self.document.once(key, mesh, lambda: self._geometry(mesh, textured))
-        material = self._materials.material(instance.material, emission, both_sides, name)
-        return self.document.add("meshes", {"name": name, "primitives": [{**geometry, "material": material}]}), middle
+    def _body(self, body: Body, name: str) -> None:
+        """Adds a mesh, each of whose parts is a primitive, and its node."""
+        parts, at = [self._part(one, name) for one in body], body[0]
+        key = "mesh", *((id(mesh), look.key) for mesh, look in parts)
+        number, middle = self.document.once(key, parts, lambda: self._mesh(parts, name))
+        matrix = at.to_world if middle is None else product(at.to_world, middle)
+        self._place({"name": name, "mesh": number}, matrix, at.track)
+
+    def _mesh(self, parts: list[_Part], name: str) -> tuple[int, Matrix | None]:
+        """The index of a mesh with its materials, and the place of its origin if that was moved."""
+        primitives, middle = [], None
+        for mesh, look in parts:
+            textured = mesh.uvs is not None and depends_on_uv(look.material)
+            make = partial(self._geometry, mesh, textured)
+            geometry, middle = self.document.once(("geometry", id(mesh), textured), mesh, make)
+            primitives.append({**geometry, "material": self._materials.material(look, name)})
+        return self.document.add("meshes", {"name": name, "primitives": primitives}), middle
 
     def _geometry(self, mesh: Mesh, textured: bool) -> tuple[Json, Matrix | None]:
         """Vertices and faces; the format has floats of 32 bits, so that far vertices are given from their middle."""

@@ -12,8 +12,9 @@ from pathlib import Path
 
 import numpy as np
 
-from scenes.canonical import ImageTexture, Material, Texture
+from scenes.canonical import ImageTexture, Material, Medium, Texture
 from scenes.canonical.values import Rgb
+from scenes.formats.appearance.attenuation import attenuation
 from scenes.formats.appearance.folding import mean_of
 from scenes.formats.appearance.normals import map_of
 from scenes.formats.appearance.pictured import (
@@ -35,6 +36,28 @@ _NEAREST, _LINEAR, _LINEAR_LEVELS = 9728, 9729, 9987
 _WRAPS = {"repeat": 10497, "clamp": 33071, "black": 33071}
 
 
+@dataclass(frozen=True, eq=False)
+class Look:
+    """What a material of glTF holds.
+
+    Attributes:
+        material: material of the surface.
+        emission: radiance of a lamp with this material; None for that of the material.
+        both_sides: whether it is the same on both sides; otherwise its back is not drawn.
+        medium: medium within glass, which absorbs.
+    """
+
+    material: Material
+    emission: Rgb | None
+    both_sides: bool
+    medium: Medium | None
+
+    @property
+    def key(self) -> tuple[object, ...]:
+        """A key that is equal for equal looks."""
+        return id(self.material), self.emission, self.both_sides, self.medium
+
+
 @dataclass
 class GltfMaterialWriter:
     """Writes materials, each once."""
@@ -43,22 +66,14 @@ class GltfMaterialWriter:
     report: LossReport
     _surfaces: dict[int, tuple[Material, Surface]] = field(default_factory=dict)
 
-    def material(self, material: Material, emission: Rgb | None, both_sides: bool, where: str) -> int:
-        """The index of a material.
+    def material(self, look: Look, where: str) -> int:
+        """The index of a material; ``where`` is its place for messages."""
+        return self.document.once(("material", look.key), look, lambda: self._material(look, where))
 
-        Args:
-            material: material.
-            emission: radiance of a lamp with this material; None for that of the material.
-            both_sides: whether it is the same on both sides; otherwise its back is not drawn.
-            where: place for messages.
-        """
-        key = "material", id(material), emission, both_sides
-        return self.document.once(key, material, lambda: self._material(material, emission, both_sides, where))
-
-    def _material(self, material: Material, emission: Rgb | None, both_sides: bool, where: str) -> int:
-        surface = surface_of(material, where, self.report)
+    def _material(self, look: Look, where: str) -> int:
+        surface = surface_of(look.material, where, self.report)
         rough: Json = {"metallicFactor": surface.metallic, "roughnessFactor": surface.roughness}
-        made: Json = {"pbrMetallicRoughness": rough, "doubleSided": both_sides}
+        made: Json = {"pbrMetallicRoughness": rough, "doubleSided": look.both_sides}
         self._base(surface, rough, made, where)
         if surface.parts is not None:
             factor, image = self._factored(surface.parts, where, "numbers")
@@ -72,8 +87,8 @@ class GltfMaterialWriter:
                 self.report.add(where, "a normal map", "the normals of the shape")
             else:
                 made["normalTexture"] = {**self._lookup(surface, image, "numbers"), "scale": surface.normal_scale}
-        self._emission(surface, emission, made, where)
-        self._extensions(surface, made)
+        self._emission(surface, look.emission, made, where)
+        self._extensions(surface, look.medium, made)
         return self.document.add("materials", made)
 
     def _base(self, surface: Surface, rough: Json, made: Json, where: str) -> None:
@@ -129,11 +144,11 @@ class GltfMaterialWriter:
         if strength > 1.0:
             self._add(made, "emissive_strength", {"emissiveStrength": strength})
 
-    def _extensions(self, surface: Surface, made: Json) -> None:
+    def _extensions(self, surface: Surface, medium: Medium | None, made: Json) -> None:
         if surface.transmitted:
             self._add(made, "transmission", {"transmissionFactor": 1.0})
             if surface.thick:
-                self._add(made, "volume", {"thicknessFactor": 1.0})
+                self._add(made, "volume", {"thicknessFactor": 1.0, **({} if medium is None else attenuation(medium))})
         if surface.ior != 1.5:
             self._add(made, "ior", {"ior": surface.ior})
         if surface.specular != 1.0:

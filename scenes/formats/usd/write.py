@@ -35,15 +35,17 @@ from scenes.canonical import (
 )
 from scenes.canonical.values import Matrix, RigidTrack
 from scenes.formats.appearance.media import without_media
+from scenes.formats.geometry.bodies import Body, bodies_of, joined
 from scenes.formats.geometry.conventions import aspect_of
-from scenes.formats.geometry.meshed import about_middle, as_mesh, depends_on_uv, rectangle_mesh, shape_name
+from scenes.formats.geometry.meshed import as_mesh, depends_on_uv, rectangle_mesh, shape_name
 from scenes.formats.geometry.placing import has_two_sides, keys_from_zero, lose_undrawn_back, shines
 from scenes.formats.losses import LossReport, without_settings
 from scenes.formats.text.output import Output
 from scenes.formats.usd.document import RATE, ROOT, UsdStage, packed
 from scenes.formats.usd.write_lights import UsdLightWriter, is_lamp_alone, strengthen
 from scenes.formats.usd.write_materials import UsdMaterialWriter
-from scenes.models.usd_library import Gf, Sdf, UsdGeom, UsdLux, UsdShade, Vt
+from scenes.formats.usd.write_shapes import material_prims, write_curves, write_mesh
+from scenes.models.usd_library import Gf, UsdGeom, UsdLux, UsdShade
 from scenes.viewing import up_of
 
 _PROTOTYPES = f"{ROOT}/Prototypes"
@@ -67,12 +69,13 @@ class UsdWriter:
         if determinant(scene.camera.to_world) < 0.0:
             self.document.place(UsdGeom.Xform.Get(self.stage, ROOT), np.diag([-1.0, 1.0, 1.0, 1.0]))
         self._camera(scene.camera, scene.film)
-        keys = list(map(_shared_key, scene.instances))
+        bodies = list(bodies_of(scene.instances, _alike))
+        keys = list(map(_shared_key, bodies))
         self._counts = Counter(keys)
-        for number, (instance, key) in enumerate(zip(scene.instances, keys, strict=True)):
-            self._instance(
-                instance, key, instance.name.rpartition("/")[2] or f"{type(instance.shape).__name__}{number}"
-            )
+        number = 0
+        for body, key in zip(bodies, keys, strict=True):
+            self._body(body, key, body[0].name.rpartition("/")[2] or f"{type(body[0].shape).__name__}{number}")
+            number += len(body)
         self.document.place_instances()
         for light in scene.lights:
             self._lights.light(light)
@@ -137,34 +140,37 @@ class UsdWriter:
 
     # --- shapes ------------------------------------------------------------------------------------------------------
 
-    def _instance(self, instance: Instance, key: Any, name: str) -> None:
+    def _body(self, body: Body, key: Any, name: str) -> None:
+        """Writes an instance, or the parts of one mesh."""
+        at = body[0]
         if key is None or self._counts[key] == 1:
             self.document.place_instances()  # in the order of the scene
         if key is None:
-            path, matrix = self._place(name, instance.to_world, instance.track)
-            self._lights.lamp(instance, path, matrix)
+            path, matrix = self._place(name, at.to_world, at.track)
+            self._lights.lamp(at, path, matrix)
             return
-        lose_undrawn_back(instance, name, self.report)
+        for part in body:
+            lose_undrawn_back(part, name, self.report)
         if self._counts[key] == 1:
-            path, matrix = self._place(name, instance.to_world, instance.track)
-            self._shape(instance, path, matrix, name)
+            path, matrix = self._place(name, at.to_world, at.track)
+            self._shape(body, path, matrix, name)
             return
-        prototype = self.document.once(
-            ("prototype", key), (instance.shape, instance.material), lambda: self._prototype(instance, name)
-        )
-        path, matrix = self._place(name, instance.to_world, instance.track)
+        kept = [(part.shape, part.material) for part in body]
+        prototype = self.document.once(("prototype", key), kept, lambda: self._prototype(body, name))
+        path, matrix = self._place(name, at.to_world, at.track)
         self.document.instance(path, prototype, matrix)
 
-    def _prototype(self, instance: Instance, name: str) -> str:
+    def _prototype(self, body: Body, name: str) -> str:
         """The path of a class that instances share."""
         self.document.once("prototypes", None, lambda: self.stage.CreateClassPrim(_PROTOTYPES))
         path = self.document.path(name, _PROTOTYPES)
         self.stage.CreateClassPrim(path).SetTypeName("Xform")
-        self._shape(instance, self.document.path(name, path), np.eye(4), name)
+        self._shape(body, self.document.path(name, path), np.eye(4), name)
         return path
 
-    def _shape(self, instance: Instance, path: str, matrix: Matrix, name: str) -> None:
-        """Writes a shape with its material."""
+    def _shape(self, body: Body, path: str, matrix: Matrix, name: str) -> None:
+        """Writes a shape with its material, or a mesh with a material for each part."""
+        instance = body[0]
         shape, textured = instance.shape, depends_on_uv(instance.material)
         if isinstance(shape, Sphere) and not textured:
             made = UsdGeom.Sphere.Define(self.stage, path)
@@ -174,43 +180,25 @@ class UsdWriter:
             made = UsdGeom.Cube.Define(self.stage, path)
             made.CreateSizeAttr(2.0)
         elif isinstance(shape, Curves) and not textured:
-            made = self._curves(shape, path, name)
+            made = write_curves(self.document, shape, path, name, self.report)
         else:
             if isinstance(shape, Disk | Sphere | Curves):
                 became = f"a mesh of {len(as_mesh(shape).faces)} triangles"
                 self.report.add(name, shape_name(shape), became)
             mesh = rectangle_mesh() if isinstance(shape, Rectangle) else as_mesh(shape)
-            made, middle = self._mesh(mesh, path, textured)
+            if len(body) > 1:
+                mesh, textured = joined(body), True
+            made, middle = write_mesh(self.document, mesh, path, textured)
             matrix = matrix if middle is None else product(matrix, middle)
         self.document.place(made, matrix)
         if has_two_sides(instance):
             made.CreateDoubleSidedAttr(True)
-        emission = instance.emission if not isinstance(instance.material, Emissive) else None
-        material = self._materials.material(instance.material, emission, name)
-        UsdShade.MaterialBindingAPI.Apply(made.GetPrim()).Bind(material)
+        for part, prim in zip(body, material_prims(made, body), strict=True):
+            emission = part.emission if not isinstance(part.material, Emissive) else None
+            material = self._materials.material(part.material, emission, name)
+            UsdShade.MaterialBindingAPI.Apply(prim).Bind(material)
         if shines(instance):
             self._shine(made.GetPrim())
-
-    def _curves(self, curves: Curves, path: str, name: str) -> Any:
-        """Curves with their widths; those without normals are round in USD."""
-        if curves.kind in ("flat", "cylinder"):
-            self.report.add(name, f"curves of the kind {curves.kind!r}, which face the viewer", "round curves")
-        made = UsdGeom.BasisCurves.Define(self.stage, path)
-        made.CreateTypeAttr("linear" if curves.basis == "linear" else "cubic")
-        if curves.basis != "linear":
-            made.CreateBasisAttr(curves.basis)
-        made.CreateWrapAttr("nonperiodic")
-        made.CreateCurveVertexCountsAttr(Vt.IntArray.FromNumpy(np.ascontiguousarray(curves.counts, np.int32)))
-        made.CreatePointsAttr(self.document.vectors(curves.points, f"points of {path}"))
-        made.CreateWidthsAttr(Vt.FloatArray.FromNumpy(np.ascontiguousarray(curves.widths, np.float32)))
-        made.SetWidthsInterpolation("vertex")
-        wide = 0.5 * float(curves.widths.max())
-        ends = np.stack([curves.points.min(axis=0) - wide, curves.points.max(axis=0) + wide])
-        made.CreateExtentAttr(self.document.vectors(ends, f"extent of {path}"))
-        if curves.normals is not None:
-            made.CreateNormalsAttr(self.document.vectors(curves.normals, f"normals of {path}"))
-            made.SetNormalsInterpolation("varying")
-        return made
 
     def _shine(self, prim: Any) -> None:
         """Makes a light of a shape whose material shines."""
@@ -221,33 +209,27 @@ class UsdWriter:
         strengthen(prim, (1.0, 1.0, 1.0))
         UsdLux.LightAPI(prim).CreateMaterialSyncModeAttr("materialGlowTintsLight")
 
-    def _mesh(self, mesh: Mesh, path: str, textured: bool) -> tuple[Any, Matrix | None]:
-        """A mesh, and the place of its origin if that was moved."""
-        points, middle = about_middle(mesh)
-        made = UsdGeom.Mesh.Define(self.stage, path)
-        vectors = self.document.vectors
-        made.CreatePointsAttr(vectors(points, f"vertices of {path}"))
-        made.CreateExtentAttr(vectors(np.stack([points.min(axis=0), points.max(axis=0)]), f"the size of {path}"))
-        made.CreateFaceVertexCountsAttr(Vt.IntArray(len(mesh.faces), 3))
-        made.CreateFaceVertexIndicesAttr(Vt.IntArray.FromNumpy(np.ascontiguousarray(mesh.faces.ravel(), np.int32)))
-        made.CreateSubdivisionSchemeAttr("none")
-        if mesh.normals is not None:
-            made.CreateNormalsAttr(vectors(mesh.normals, f"normals of {path}"))
-            made.SetNormalsInterpolation("vertex")
-        if textured and mesh.uvs is not None:
-            kinds = Sdf.ValueTypeNames.TexCoord2fArray, "vertex"
-            UsdGeom.PrimvarsAPI(made).CreatePrimvar("st", *kinds).Set(
-                vectors(mesh.uvs, f"texture coordinates of {path}", "Vec2fArray")
-            )
-        return made, middle
+
+def _alike(first: Instance, second: Instance) -> bool:
+    """Whether one mesh can have both meshes as parts."""
+    normals = [isinstance(one.shape, Mesh) and one.shape.normals is not None for one in (first, second)]
+    sides = has_two_sides(first) == has_two_sides(second)
+    return sides and normals[0] == normals[1] and not (shines(first) or shines(second))
 
 
-def _shared_key(instance: Instance) -> Any:
-    """A key that is equal for instances that share all but their place; None for lamps of UsdLux."""
-    if is_lamp_alone(instance):
+def _shared_key(body: Body) -> Any:
+    """A key that is equal for bodies that share all but their place; None for lamps of UsdLux."""
+    if is_lamp_alone(body[0]):
         return None
-    shape = id(instance.shape) if isinstance(instance.shape, Mesh) else instance.shape
-    return shape, id(instance.material), instance.emission, has_two_sides(instance)
+    return tuple(
+        (
+            id(one.shape) if isinstance(one.shape, Mesh) else one.shape,
+            id(one.material),
+            one.emission,
+            has_two_sides(one),
+        )
+        for one in body
+    )
 
 
 def save_usd(scene: Scene, output: Output, report: LossReport) -> None:

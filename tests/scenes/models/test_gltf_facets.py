@@ -92,7 +92,7 @@ def test_blended_colours_and_rough_glass(tmp_path: Path) -> None:
     (tmp_path / "glass").mkdir()
     glass = quad(
         tmp_path / "glass",
-        pbrMetallicRoughness={"roughnessFactor": 0.5},
+        pbrMetallicRoughness={"metallicFactor": 0.0, "roughnessFactor": 0.5},
         extensions={
             "KHR_materials_transmission": {"transmissionFactor": 1.0}, "KHR_materials_volume": {"thicknessFactor": 1.0}
         },

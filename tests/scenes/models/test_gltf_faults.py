@@ -56,7 +56,9 @@ def whole_file(folder: Path) -> Gltf:
             "KHR_materials_emissive_strength": {"emissiveStrength": 2}, "KHR_materials_ior": {"ior": 1.4},
             "KHR_materials_specular": {"specularFactor": 0.5},
             "KHR_materials_transmission": {"transmissionFactor": 0.2},
-            "KHR_materials_volume": {"thicknessFactor": 1.0, "attenuationColor": [1, 1, 1]},
+            "KHR_materials_volume": {
+                "thicknessFactor": 1.0, "attenuationColor": [0.9, 0.8, 0.7], "attenuationDistance": 2.0,
+            },
         },
     )  # fmt: skip
     keys, values = file.accessor(np.array([0, 1], np.float32)), file.accessor(np.eye(4, dtype=np.float32)[:2])

@@ -192,7 +192,11 @@ def test_sparse_and_strided_accessors(tmp_path: Path) -> None:
          Emissive, ""),
         ({"emissiveFactor": [1, 0, 0], "extensions": {"KHR_materials_emissive_strength": {"emissiveStrength": 3.0}}},
          Emissive, "lights nothing"),
-        ({"extensions": {"KHR_materials_transmission": {"transmissionFactor": 1.0}}}, Glass, ""),
+        ({"extensions": {"KHR_materials_transmission": {"transmissionFactor": 1.0}},
+          "pbrMetallicRoughness": {"metallicFactor": 0.0}}, Glass, ""),
+        ({"extensions": {"KHR_materials_transmission": {"transmissionFactor": 1.0}}}, Phong, ""),  # a metal
+        ({"extensions": {"KHR_materials_transmission": {"transmissionFactor": 0.7}},
+          "pbrMetallicRoughness": {"metallicFactor": 0.0}}, Glass, "light that passes in part: glass"),
         ({"alphaMode": "BLEND", "pbrMetallicRoughness": {"baseColorFactor": [1, 1, 1, 0.2]}}, Glass, "opacity"),
         ({"normalTexture": {"index": 0}}, Phong, "normalTexture"),
         ({"extensions": {"KHR_materials_sheen": {}}}, Phong, "KHR_materials_sheen"),

@@ -48,8 +48,9 @@ ABSENT = object()
 
 def variants(folder: Path) -> Iterator[Gltf]:
     """Files that have each part where it counts."""
-    file = whole_file(folder)
     Image.new("RGB", (2, 2), (77, 33, 11)).save(folder / "other.png")
+    file = whole_file(folder)
+    del file.json["materials"][0]["extensions"]["KHR_materials_transmission"]
     file.texture("other.png")
     one, two = file.json["cameras"]
     file.json["cameras"] = [{**one, **two, "type": kind["type"]} for kind in (one, two)]
@@ -68,8 +69,10 @@ def variants(folder: Path) -> Iterator[Gltf]:
     yield file
     file = whole_file(folder)
     del file.json["materials"][0]["extensions"]["KHR_materials_specular"]
-    through = {"KHR_materials_transmission": {"transmissionFactor": 1.0},
-               "KHR_materials_volume": {"thicknessFactor": 1.0, "attenuationColor": [1, 1, 1]}}  # fmt: skip
+    part = {"index": file.texture("other.png")}
+    absorbs = {"attenuationColor": [0.9, 0.8, 0.7], "attenuationDistance": 2.0}
+    through = {"KHR_materials_transmission": {"transmissionFactor": 1.0, "transmissionTexture": part},
+               "KHR_materials_volume": {"thicknessFactor": 1.0, **absorbs}}  # fmt: skip
     file.json["materials"][0]["extensions"] |= through
     yield file
     file = whole_file(folder)
