@@ -14,7 +14,7 @@ from matplotlib.ticker import FuncFormatter
 from numpy.typing import NDArray
 
 from analysis.metrics.arrays import Floats
-from analysis.page.figures import ADAPTIVE, FRAMED, GRID, INKS, MARKERS
+from analysis.page.figures import ADAPTIVE, FRAMED, GRID, INKS, MARKERS, label_ends
 from analysis.spectrum.estimate_check import Example, Tiles
 from analysis.spectrum.ideal_density import share_of_total
 from analysis.spectrum.spectra import Spectrum
@@ -126,14 +126,16 @@ def norm_figure(example: Example) -> Figure:
     _plain(right)
     norm = share_of_total(example.tiles.norm)[0].numpy()
     frequency = np.arange(1, norm.shape[1] + 1)
-    right.loglog(frequency, norm[0], color=FRAMED, label="up to one cycle per span (this slice)")
-    right.loglog(frequency, norm[-1], color=ADAPTIVE, linestyle="--", label="all temporal frequencies")
-    right.axvline(f_s, color="0.2", linewidth=0.9, linestyle=":", label="$f_s$")
+    right.loglog(frequency, norm[0], color=FRAMED, label="this slice")
+    right.loglog(frequency, norm[-1], color=ADAPTIVE, linestyle="--", label="all frequencies in time")
+    right.axvline(f_s, color="0.2", linewidth=0.9, linestyle=":")
+    top = {"xycoords": right.get_xaxis_transform(), "textcoords": "offset points"}
+    right.annotate("$f_s$", (f_s, 1.0), (0, 3), ha="center", fontsize=9, **top)
     right.set_xlabel("band width s, cycles per tile")
     right.set_ylabel("power norm, share of the total")
     right.yaxis.set_major_formatter("{x:.3g}")
     right.yaxis.set_minor_formatter("{x:.2g}")
-    right.legend(facecolor="w", edgecolor="none", framealpha=1.0, fontsize=8, loc="center right")
+    label_ends(right)
     return figure
 
 
@@ -157,7 +159,7 @@ def _contour(figure: Figure, axis: Axes, example: Example) -> None:
     axis.contour(*_rates(example), levels=_LEVELS[1:-1], colors="k", linewidths=0.4)
     figure.colorbar(filled, ax=axis, label="power norm, share of the total", ticks=_LEVELS, format="%g")
     ideal = np.log2(2 * example.band[0] * example.unit[0]), np.log2(2 * example.band[1] * example.unit[1])
-    axis.plot(*ideal, "*", color="w", markeredgecolor="k", markersize=15)
+    axis.plot(*ideal, "*", color="w", markeredgecolor="k", markersize=15, clip_on=False, zorder=5)
     axis.annotate("Θ*", ideal, (7, 5), textcoords="offset points", fontsize=12, fontweight="bold")
     _rate_axes(axis)
 
@@ -185,16 +187,18 @@ def estimate_figure(example: Example) -> Figure:
     at = np.log2(example.tiles.theta.numpy() * example.unit)
     phi = example.tiles.phi[0].numpy()
     axis.quiver(*at.T, *phi.T, angles="xy", scale_units="xy", scale=1.4, color=ADAPTIVE, width=0.005, zorder=4)
-    axis.plot(*at.T, "o", color=ADAPTIVE, markersize=3.5, zorder=4)
+    axis.plot(*at.T, "o", color=ADAPTIVE, markersize=3.5, zorder=4, clip_on=False)
     (x0, x1), (y0, y1) = np.log2(example.realizable)
     axis.add_patch(Rectangle((x0, y0), x1 - x0, y1 - y0, fill=False, color="w", linewidth=3.0))
     axis.add_patch(Rectangle((x0, y0), x1 - x0, y1 - y0, fill=False, color="k", linewidth=1.4, linestyle="--"))
-    axis.annotate(
-        "$\\Omega_\\theta$", (x0, y1), (6, -16), textcoords="offset points", color="w", fontsize=12, fontweight="bold"
-    )
     space, time, _ = _rates(example)
-    axis.set_xlim(min(x0, at[:, 0].min()) - 0.6, min(space[-1], at[:, 0].max() + 0.6))
-    axis.set_ylim(min(y0, at[:, 1].min()) - 0.6, time[-1])
+    inside = (max(x0, space[0]), min(y1, time[-1]))
+    axis.annotate(
+        "$\\Omega_\\theta$", inside, (6, -16), textcoords="offset points", color="w", fontsize=12, fontweight="bold"
+    )
+    axis.set_xlim(min(x0, space[0], at[:, 0].min()), space[-1])
+    low = min(y0, at[:, 1].min())
+    axis.set_ylim(max(low - 0.6, min(low, time[0])), time[-1])
     axis.set_title("arrows: the streaming estimate φ at rates a; dashed: realizable rates", fontsize=9, loc="left")
     return figure
 
@@ -230,7 +234,8 @@ def agreement_figure(tiles: Mapping[str, Tiles], found: Mapping[str, Any], tau: 
         axis.set_title(f"{name}: rank correlation {rank:.2f}", fontsize=9)
         axis.set_xlabel(f"octaves to Θ* in {name}")
         axis.set_ylabel(f"estimate φ in {name}")
-    axes[1].legend(frameon=False, fontsize=7, markerscale=3, loc="upper left")
+    figure.legend(*axes[1].get_legend_handles_labels(), frameon=False, fontsize=7, markerscale=3,
+                  loc="outside right upper")  # fmt: skip
     for axis in axes:
         _plain(axis)
     return figure
