@@ -6,6 +6,7 @@ Usage: python docs/example_files.py [FOLDER]
 
 from __future__ import annotations
 
+import argparse
 import sys
 from pathlib import Path
 
@@ -124,4 +125,6 @@ def main(folder: Path) -> None:
 
 
 if __name__ == "__main__":
-    main(Path(sys.argv[1]) if len(sys.argv) > 1 else Path("out/models"))
+    parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
+    parser.add_argument("folder", nargs="?", type=Path, default=Path("out/models"), help="destination")
+    main(parser.parse_args().folder)

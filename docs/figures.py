@@ -5,6 +5,7 @@ Usage: python docs/figures.py [FOLDER]
 
 from __future__ import annotations
 
+import argparse
 import sys
 from pathlib import Path
 
@@ -201,31 +202,33 @@ def response() -> Figure:
     asked = Errors(torch.tensor([0.4]), torch.tensor([0.25]))
     local = constrain(a_s, a_t, asked, box, 1.0)
     wanted = (a_s + local.k_min * local.m_s, a_t + local.k_min * local.m_t)
-    figure = Figure(figsize=(5.6, 4.6), layout="constrained")
+    figure = Figure(figsize=(6.4, 4.6), layout="constrained")
     axis = figure.subplots()
     axis.add_patch(
         Rectangle((box.spatial_min, box.temporal_min), 1 - box.spatial_min, 1 - box.temporal_min, fill=False)
     )
-    s = np.linspace(0.02, 1, 400)
-    for share, label in ((0.0, "θ before"), (0.4, "θ with 40 % of the change"), (1.0, "θ that is wanted")):
+    s = np.linspace(0.02, 1.05, 400)
+    for share, label in ((0.0, "θ before"), (0.4, "θ with 40 %\nof the change"), (1.0, "θ that is\nwanted")):
         change = local.desired_change * share
         product = float(a_s * a_t + change)
-        axis.plot(s, product / s, color=MUTED, lw=0.8, ls=("--", "-.", ":")[int(2 * share + 0.5)], label=label)
+        axis.plot(s, product / s, color="0.45", lw=0.9, ls=("--", "-.", ":")[int(2 * share + 0.5)])
+        axis.annotate(label, (1.05, product / 1.05), (5, 0), textcoords="offset points", va="center", fontsize=8)
         if 0 < share < 1:
             granted = mix(local, change, box, 0.0)
     axis.annotate("", [float(v) for v in wanted], start, arrowprops={"arrowstyle": "->", "color": ACCENT, "lw": 2})
-    marks = {"a, before": (start, MUTED), "b*, wanted": (wanted, ACCENT), "b, granted": (granted, SECOND)}
+    marks = {"a, before": (start, "0.3"), "b*, wanted": (wanted, ACCENT), "b, granted": (granted, SECOND)}
     for label, ((at_s, at_t), ink) in marks.items():
         axis.plot(float(at_s), float(at_t), "o", color=ink)
-        axis.annotate(label, (float(at_s), float(at_t)), textcoords="offset points", xytext=(8, -12), color=ink)
+        axis.annotate(label, (float(at_s), float(at_t)), (14, 0), textcoords="offset points", va="center", color=ink)
     axis.set(xlim=(0, 1.05), ylim=(0, 1.05), xlabel="θs / greatest θs", ylabel="θt / greatest θt")
-    axis.legend(loc="upper right", fontsize=8)
     return figure
 
 
 def main() -> None:
     """Draws all pictures into a folder, docs/pictures unless one is named."""
-    folder = Path(sys.argv[1]) if len(sys.argv) > 1 else Path(__file__).parent / "pictures"
+    parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
+    parser.add_argument("folder", nargs="?", type=Path, default=Path(__file__).parent / "pictures", help="destination")
+    folder = parser.parse_args().folder
     folder.mkdir(parents=True, exist_ok=True)
     cycles = played(TsarConfig(batch_size=64, resolution_px=256))
     record, display = cycles[-1]

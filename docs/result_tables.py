@@ -5,7 +5,7 @@ Usage: python docs/result_tables.py PAGE FOLDER, such as docs/results/parts.md o
 
 from __future__ import annotations
 
-import sys
+import argparse
 from collections import defaultdict
 from itertools import groupby
 from pathlib import Path
@@ -49,7 +49,11 @@ def replaced(page: str, written: str) -> tuple[str, list[str]]:
 
 def main() -> None:
     """Rewrites the page, and says which tables were replaced."""
-    page, folder = (Path(argument) for argument in sys.argv[1:])
+    parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
+    parser.add_argument("page", type=Path, help="page of results, such as docs/results/parts.md")
+    parser.add_argument("folder", type=Path, help="folder of the study, such as out/ablation")
+    asked = parser.parse_args()
+    page, folder = asked.page, asked.folder
     text, common = replaced(page.read_text(encoding="utf-8"), (folder / "tables.md").read_text(encoding="utf-8"))
     page.write_text(text, encoding="utf-8")
     print(*(f"replaced: {names}" for names in common), f"{page}: date, revision and prose are yours to check", sep="\n")

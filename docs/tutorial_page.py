@@ -8,6 +8,7 @@ With --small, smaller numbers replace those at the beginning of the script.
 
 from __future__ import annotations
 
+import argparse
 import contextlib
 import io
 import os
@@ -63,13 +64,15 @@ def written(source: str, pictures: Path) -> str:
 
 def main() -> None:
     """Writes tutorial.md and pictures/ into a folder, docs unless one is named."""
-    arguments = sys.argv[1:]
+    parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
+    parser.add_argument("folder", nargs="?", type=Path, default=ROOT / "docs", help="destination")
+    parser.add_argument("--small", action="store_true", help="smaller and shorter runs, for tests")
+    asked = parser.parse_args()
     source = SCRIPT.read_text(encoding="utf-8")
-    if "--small" in arguments:
-        arguments.remove("--small")
+    if asked.small:
         assert SETTINGS in source, f"{SCRIPT.name}: expected the line {SETTINGS!r}"
         source = source.replace(SETTINGS, SMALL)
-    folder = Path(arguments[0] if arguments else ROOT / "docs").resolve()
+    folder = asked.folder.resolve()
     (folder / "pictures").mkdir(parents=True, exist_ok=True)
     with tempfile.TemporaryDirectory() as place:
         os.chdir(place)

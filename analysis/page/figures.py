@@ -19,6 +19,7 @@ from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
+from matplotlib.patheffects import withStroke
 from matplotlib.transforms import Affine2D, ScaledTranslation, blended_transform_factory
 from numpy.typing import NDArray
 
@@ -34,6 +35,7 @@ ADAPTIVE, FRAMED, OTHER = INKS[:3]
 GRID = {"color": "0.88", "linewidth": 0.6}
 """Grid lines behind what is plotted."""
 _LINE_PT = 12  # points between labels
+_LABEL_GAP_PT = 8  # points from a point to its label
 _LEAD_PT = 3, 14, 25  # from the axes to the begin, mark and end of the piece of a line before its label
 
 
@@ -111,6 +113,42 @@ def label_ends(axis: Axes) -> None:
         lead.set(data=(_LEAD_PT, [place] * len(_LEAD_PT)), markevery=[1], label="_lead", clip_on=False)
         lead.set_transform(blended_transform_factory(points + edge, axis.transAxes))
         axis.add_artist(lead)
+
+
+def label_points(
+    axis: Axes, places: Sequence[Sequence[float]], labels: Sequence[str], size_pt: float, bold: str
+) -> None:
+    """Writes labels to the right of points, without overlap, each with a thin line to its point. The axes and all else
+    in the figure must be final.
+
+    Args:
+        axis: the axes.
+        places: x and y of the points.
+        labels: a label each; points that lie close in x share a column of labels.
+        size_pt: font size, points.
+        bold: the label that is set in bold.
+    """
+    figure = axis.get_figure(root=True)
+    assert figure is not None
+    figure.draw_without_rendering()  # finds the size of the axes
+    at, pixels = axis.transData.transform(places), figure.dpi / 72
+    low, high = axis.transAxes.transform([(0, 0), (1, 1)])[:, 1]
+    columns, edges = list[list[int]](), list[float]()
+    for i in np.argsort(at[:, 0], kind="stable").tolist():
+        joined = bool(columns) and at[i, 0] < edges[-1]
+        columns = [*columns[:-1], [*columns[-1], i]] if joined else [*columns, [i]]
+        width = (_LABEL_GAP_PT + 0.7 * size_pt * max(len(labels[k]) for k in columns[-1])) * pixels
+        edges = [*(edges[:-1] if joined else edges), at[i, 0] + width]
+    for column in columns:
+        right = at[column, 0].max() + _LABEL_GAP_PT * pixels
+        ys = spread(at[column, 1].tolist(), 1.25 * size_pt * pixels, low, high)
+        for i, y in zip(column, ys, strict=True):
+            axis.annotate(
+                labels[i], places[i], axis.transAxes.inverted().transform((right, y)), textcoords="axes fraction",
+                va="center", fontsize=size_pt, fontweight="bold" if labels[i] == bold else "normal", zorder=5,
+                arrowprops={"arrowstyle": "-", "color": "0.6", "linewidth": 0.5, "shrinkA": 0, "shrinkB": 2},
+                path_effects=[withStroke(linewidth=1.5, foreground="white")],
+            )  # fmt: skip
 
 
 def spread(wanted: Sequence[float], apart: float, low: float, high: float) -> list[float]:

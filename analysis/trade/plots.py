@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from textwrap import wrap
 from typing import Any
 
 import numpy as np
@@ -12,7 +13,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter
 
 from analysis.metrics.front import knee, on_front
-from analysis.page.figures import ADAPTIVE, FRAMED, GRID, OTHER
+from analysis.page.figures import ADAPTIVE, FRAMED, GRID, OTHER, label_points
 from analysis.trade.knobs import KNOBS, OWN, said
 from analysis.trade.runs import SEARCH
 from analysis.trade.tables import Relative, lines
@@ -40,7 +41,7 @@ def _short_ticks(axis: Axes) -> None:
 
 def front(found: Relative, points: pd.DataFrame) -> Figure:
     """Cost and error of all settings over those of the default, and the front with its band and its knee."""
-    drawn = Figure(figsize=(9.5, 6.5), layout="constrained")
+    drawn = Figure(figsize=(11.0, 6.5), layout="constrained")
     axis = drawn.subplots()
     _plain(axis, "cost over that of the default (log scale)", "mean squared error over that of the default (log scale)")
     _short_ticks(axis)
@@ -65,12 +66,21 @@ def front(found: Relative, points: pd.DataFrame) -> Figure:
     at = lines(table, table["knee"])
     axis.plot(at["cost"], at["error"], "*", color="k", markersize=15, label="knee")
     axis.plot([1.0], [1.0], "s", markerfacecolor="none", markeredgecolor="k", markersize=10, label="default")
-    for line in _apart(best.to_dict("records")):
-        text = line["setting"].removeprefix("tsar, ")
-        text = text if len(text) <= 44 else text[:43] + "…"
-        axis.annotate(text, (line["cost"], line["error"]), xytext=(5, 6), textcoords="offset points", fontsize=7,
-                      color="0.25")  # fmt: skip
-    axis.legend(frameon=False, fontsize=8, loc="upper right")
+    for number, line in enumerate(sorted(_apart(best.to_dict("records")), key=lambda line: line["cost"]), 1):
+        text = "\n".join(wrap(line["setting"].removeprefix("tsar, "), 36))
+        axis.plot(
+            [],
+            [],
+            marker=f"${number}$",
+            color="0.1",
+            markersize=2 + 3 * len(str(number)),
+            markeredgewidth=0,
+            linestyle="",
+            label=text,
+        )
+        axis.annotate(str(number), (line["cost"], line["error"]), xytext=(-7, -4), textcoords="offset points",
+                      fontsize=8, ha="right", va="top", color="0.1")  # fmt: skip
+    drawn.legend(frameon=False, fontsize=8, loc="outside right upper")
     return drawn
 
 
@@ -94,7 +104,7 @@ def knobs(table: pd.DataFrame) -> Figure:
     panels = drawn.subplots(rows, columns, squeeze=False)
     for axis in panels.flat[len(names) :]:
         axis.set_visible(False)
-    low, high = table[["cost_flops"]].min().item() / 1.15, table[["cost_flops"]].max().item() * 1.15
+    low, high = table[["cost_flops"]].min().item() / 1.15, table[["cost_flops"]].max().item() * 1.6  # room for labels
     for axis, name in zip(panels.flat, names, strict=False):
         _plain(axis, "cost", "error")
         _short_ticks(axis)
@@ -106,17 +116,13 @@ def knobs(table: pd.DataFrame) -> Figure:
         axis.axvline(1.0, color="0.6", linewidth=0.8)
         joined = "-" if name != "policy" else ""
         axis.errorbar(x, y, spread, fmt=f"o{joined}", color=ADAPTIVE, markersize=4, linewidth=1.0, capsize=2)
-        for number, (value, place) in enumerate(zip(own["value"], zip(x, y, strict=True), strict=True)):
-            default = value == said(KNOBS[name].default)  # its label lies below, since others may have its place
-            left = default or (name == "policy" and number % 2 == 0)
-            axis.annotate(
-                str(value), place, xytext=(-4 if left else 4, -4 if default else 4), textcoords="offset points",
-                fontweight="bold" if default else "normal", fontsize=5.5 if name == "policy" else 7,
-                ha="right" if left else "left", va="top" if default else "baseline",
-            )  # fmt: skip
         axis.set_xlim(low, high)
         least, most = min(0.8, own["mse_low"].min() / 1.1), max(1.25, own["mse_high"].max() * 1.15)
         axis.set_ylim(least, most)
+    for axis, name in zip(panels.flat, names, strict=False):
+        own = lines(table, table["knob"] == name)
+        labels, default = [str(value) for value in own["value"]], said(KNOBS[name].default)
+        label_points(axis, own[["cost_flops", "mse"]].to_numpy(), labels, 5.5 if len(own) > 8 else 7, default)
     return drawn
 
 

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import ast
+import itertools
 from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
 from matplotlib.figure import Figure
+from matplotlib.text import Text
 from PIL import Image, ImageColor
 
 from analysis.page.figures import (
@@ -17,6 +19,7 @@ from analysis.page.figures import (
     dashes_of,
     ink_of,
     label_ends,
+    label_points,
     line_style,
     new_figure,
     save,
@@ -132,3 +135,20 @@ def test_every_line_has_its_label_where_it_ends() -> None:
     for line, lead in zip(lines, axis.lines[3:], strict=True):
         assert lead.get_transform().transform(lead.get_xydata())[0, 0] > axis.bbox.x1
         assert (lead.get_marker(), lead._dash_pattern) == (line.get_marker(), line._dash_pattern)
+
+
+def test_labels_of_close_points_do_not_overlap() -> None:
+    """Each has a line to its point; points that lie apart have their label beside them."""
+    drawn, (axis,) = new_figure(4.0, 3.0)
+    places = [(1.0, 1.0 + 0.001 * n) for n in range(8)] + [(50.0, 2.0)]
+    axis.loglog(*zip(*places, strict=True), "o", color=INKS[0])
+    axis.set(xlim=(0.5, 200.0), ylim=(0.5, 4.0))
+    label_points(axis, places, [f"number {n}" for n in range(9)], 7.0, "number 3")
+    drawn.draw_without_rendering()
+    assert [text.get_fontweight() for text in axis.texts].count("bold") == 1
+    texts = sorted(Text.get_window_extent(text).extents.tolist() for text in axis.texts)
+    assert all(a[3] <= b[1] or b[3] <= a[1] or a[2] <= b[0] for a, b in itertools.combinations(texts, 2))
+    for text, place in zip(axis.texts, places, strict=True):
+        assert tuple(text.xy) == place and text.arrow_patch is not None
+    apart = Text.get_window_extent(axis.texts[8])
+    assert apart.y0 < axis.transData.transform(places[8])[1] < apart.y1
