@@ -21,7 +21,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patheffects import withStroke
 from matplotlib.transforms import Affine2D, ScaledTranslation, blended_transform_factory
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from analysis.storage.files import atomic
 
@@ -115,9 +115,7 @@ def label_ends(axis: Axes) -> None:
         axis.add_artist(lead)
 
 
-def label_points(
-    axis: Axes, places: Sequence[Sequence[float]], labels: Sequence[str], size_pt: float, bold: str
-) -> None:
+def label_points(axis: Axes, places: ArrayLike, labels: Sequence[str], size_pt: float, bold: str) -> None:
     """Writes labels to the right of points, without overlap, each with a thin line to its point. The axes and all else
     in the figure must be final.
 
@@ -131,7 +129,8 @@ def label_points(
     figure = axis.get_figure(root=True)
     assert figure is not None
     figure.draw_without_rendering()  # finds the size of the axes
-    at, pixels = axis.transData.transform(places), figure.dpi / 72
+    points, pixels = np.asarray(places, np.float64), figure.dpi / 72
+    at = axis.transData.transform(points)
     low, high = axis.transAxes.transform([(0, 0), (1, 1)])[:, 1]
     columns, edges = list[list[int]](), list[float]()
     for i in np.argsort(at[:, 0], kind="stable").tolist():
@@ -143,9 +142,10 @@ def label_points(
         right = at[column, 0].max() + _LABEL_GAP_PT * pixels
         ys = spread(at[column, 1].tolist(), 1.25 * size_pt * pixels, low, high)
         for i, y in zip(column, ys, strict=True):
+            place = axis.transAxes.inverted().transform((right, y)).tolist()
             axis.annotate(
-                labels[i], places[i], axis.transAxes.inverted().transform((right, y)), textcoords="axes fraction",
-                va="center", fontsize=size_pt, fontweight="bold" if labels[i] == bold else "normal", zorder=5,
+                labels[i], points[i].tolist(), place, textcoords="axes fraction", va="center", zorder=5,
+                fontsize=size_pt, fontweight="bold" if labels[i] == bold else "normal",
                 arrowprops={"arrowstyle": "-", "color": "0.6", "linewidth": 0.5, "shrinkA": 0, "shrinkB": 2},
                 path_effects=[withStroke(linewidth=1.5, foreground="white")],
             )  # fmt: skip

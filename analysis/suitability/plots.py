@@ -96,7 +96,7 @@ def behaviour(results: Results) -> Figure | None:
     part = framed.times.iloc[first : last + 1]
     figure, (axis,) = _axes(7.0, 3.2)
     _refreshes(axis, framed)
-    axis.plot(part["time_s"], part["mse"], "o-", color=FRAMED, markersize=3)
+    axis.plot(part["time_s"], part["mse"], "o-", color=FRAMED, markersize=3, clip_on=False)
     marks = {"a": changes[0], "b": changes[1] - 1, "c": changes[1]}
     for label, at in marks.items():
         row = framed.times.iloc[at]
