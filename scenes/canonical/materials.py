@@ -90,6 +90,8 @@ class Glass:
         spread_deg: full angle of the cone about the perfect reflection and refraction that rays fill uniformly.
         alpha: texture of the microfacet alpha, of which ``roughness`` is the mean; the renderer uses the mean.
         distribution: distribution of the facets of rough glass.
+        front_only: whether only the front of a pane reflects, once, and lets the rest through (architectural glass of
+            LuxCore). The renderer does not support it; it is kept for conversion.
     """
 
     reflectance: Texture = WHITE
@@ -100,6 +102,7 @@ class Glass:
     spread_deg: float = 0.0
     alpha: Texture | None = None
     distribution: Distribution = "ggx"
+    front_only: bool = False
 
     def __post_init__(self) -> None:
         _check_spread("Glass.spread_deg", self.spread_deg)

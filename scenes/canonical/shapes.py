@@ -91,7 +91,8 @@ class Instance:
         emission_twosided: whether the back emits, too. The renderer's lamps do not; it is kept for conversion.
         one_sided: whether the back is black. The renderer treats both sides equally; it is kept for conversion.
         interior, exterior: media against the normal of the surface and along it, None for vacuum. If both are None, the
-            surface is no border: the medium around it goes on behind it. The renderer has no media.
+            surface is no border: the medium around it goes on behind it. A medium without coefficients on either side
+            makes it the border of a hole within a medium. The renderer has no media.
     """
 
     shape: Shape

@@ -53,6 +53,7 @@ from scenes.canonical import (
 from scenes.daylight import sky_map, sun_light
 from scenes.formats.appearance.facets import with_even_facets
 from scenes.formats.appearance.folding import folded, mean_of
+from scenes.formats.appearance.glass import lose_front
 from scenes.formats.appearance.indices import reflectance_of_index
 from scenes.formats.appearance.media import without_media
 from scenes.formats.appearance.simpler import simpler
@@ -177,6 +178,8 @@ class Approximation:
         return self._materials[id(material)][1]
 
     def _material(self, material: Material, where: str) -> Material:
+        if isinstance(material, Glass):
+            lose_front(material, where, self.report)
         if isinstance(material, Metal | Glass | Glossy | Plastic):
             material = with_even_facets(material, where, self.report)
         if isinstance(material, MetallicRough) and not self.paths:

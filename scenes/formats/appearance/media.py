@@ -11,11 +11,39 @@ from scenes.formats.appearance.mixtures import is_nothing
 from scenes.formats.appearance.spectra import rgb
 from scenes.formats.losses import LossReport
 
+VACUUM = Medium()
+"""Vacuum by name, which the border of a hole within a medium needs: a surface without media is no border."""
 
-def filled(medium: Medium) -> Medium | None:
-    """The medium alone, or None for one that neither absorbs nor scatters."""
-    empty = max(medium.extinction) == 0.0
-    return None if empty else Medium(medium.absorption, medium.scattering, medium.g)
+
+def plain(medium: Medium) -> Medium:
+    """The coefficients of a medium alone."""
+    return Medium(medium.absorption, medium.scattering, medium.g)
+
+
+def _is_vacuum(medium: Medium | None) -> bool:
+    return medium is None or max(medium.extinction) == 0.0
+
+
+def settled(scene: Scene, report: LossReport) -> Scene:
+    """The scene whose vacuum is None, except at the borders of holes within media. Invisible surfaces that are no
+    borders are left out."""
+    media = media_of(scene)
+    if not media:
+        return scene
+    filled = not all(map(_is_vacuum, media))
+    kept = []
+    for one in scene.instances:
+        sides = one.interior, one.exterior
+        if sides != (None, None):
+            found = [None if _is_vacuum(side) else side for side in sides]
+            hole = filled and found == [None, None]
+            one = dataclasses.replace(one, interior=VACUUM if hole else found[0], exterior=found[1])
+            if one.interior is None and one.exterior is None and is_nothing(one.material) and one.emission is None:
+                report.hint(one.name or "shape", "the border of a medium, which is invisible")
+                continue
+        kept.append(one)
+    around = None if _is_vacuum(scene.medium) else scene.medium
+    return dataclasses.replace(scene, instances=tuple(kept), medium=around)
 
 
 def made_medium(absorption: Rgb, scattering: Rgb, g: float, where: str, factor: float = 1.0) -> Medium:
@@ -56,7 +84,7 @@ def absorbing_within(scene: Scene, report: LossReport) -> Scene:
         if one.interior is None or not (is_nothing(one.material) or _solid(one)) or one.emission is not None:
             kept.append(one)
             continue
-        medium = filled(Medium(one.interior.absorption))
+        medium = Medium(one.interior.absorption) if max(one.interior.absorption) > 0.0 else None
         if one.interior.scatters:
             became = "left out" if medium is None else "its absorption alone"
             report.add(one.name or "shape", "a medium inside a surface (scattering)", became)
@@ -77,7 +105,7 @@ def _bare(instance: Instance, report: LossReport, within_glass: bool) -> Instanc
     where = instance.name or "shape"
     kept = instance.interior if within_glass and _solid(instance) and instance.emission is None else None
     for side, medium in (("inside", None if kept else instance.interior), ("outside", instance.exterior)):
-        if medium is not None:
+        if medium is not None and not _is_vacuum(medium):
             report.add(where, f"a medium {side} a surface ({_named(medium)})")
     if is_nothing(instance.material) and instance.emission is None:
         return None

@@ -40,6 +40,7 @@ from scenes.canonical.textures import WHITE
 from scenes.canonical.values import Rgb
 from scenes.formats.appearance.facets import with_even_facets
 from scenes.formats.appearance.folding import changed, folded, greatest_of, mean_of, product_of
+from scenes.formats.appearance.glass import lose_rays
 from scenes.formats.appearance.indices import index_of_reflectance, reflectance_of_index
 from scenes.formats.appearance.mixtures import is_nothing
 from scenes.formats.appearance.normals import is_flat
@@ -139,8 +140,7 @@ def _textured(made: Surface, material: Rough, where: str, report: LossReport) ->
 
 
 def _glass(material: Glass, where: str, report: LossReport) -> Surface:
-    if material.spread_deg:
-        report.add(where, "rays spread about the perfect ones", "clear glass")
+    lose_rays(material, where, report)
     if material.reflectance != WHITE:
         report.add(where, "a factor of the reflection of glass", "1")
     if material.thin and material.roughness != (0.0, 0.0):

@@ -38,7 +38,7 @@ from scenes.canonical import (
 )
 from scenes.canonical.values import Matrix
 from scenes.formats.appearance.graphs import check_depth
-from scenes.formats.appearance.media import filled
+from scenes.formats.appearance.media import plain, settled
 from scenes.formats.appearance.mixtures import is_nothing
 from scenes.formats.appearance.spectra import grey, rgb
 from scenes.formats.directives.reader import DirectiveReader, typed, word
@@ -231,8 +231,8 @@ class SceneReader(DirectiveReader):
         return motion(keys, self.transforms.times_s, where, self.report)
 
     def drawn(self, medium: Medium | None) -> Medium | None:
-        """The medium of a side as it is drawn, None for vacuum."""
-        return None if medium is None else filled(medium)
+        """The medium of a side as it is drawn, None for none."""
+        return None if medium is None else plain(medium)
 
     def sides(self) -> tuple[Medium | None, Medium | None]:
         """The media inside and outside of the following shapes."""
@@ -293,4 +293,4 @@ def scene_of(reader: SceneReader, path: Path) -> Scene:
     lasts, materials = duration_s(camera, reader.instances), dict(reader.names.materials)
     medium, name = reader.drawn(reader.medium), Path(path).stem
     scene = Scene(camera, *parts, medium=medium, materials=materials, name=name, duration_s=lasts)
-    return reader.as_drawn(scene)
+    return reader.as_drawn(settled(scene, reader.report))

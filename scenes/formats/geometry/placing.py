@@ -10,7 +10,7 @@ from scipy.spatial.transform import Rotation
 
 from scenes.animation import look_at, pose_at
 from scenes.arithmetic import product
-from scenes.canonical import Emissive, Instance, Medium, Mesh, Scene
+from scenes.canonical import Curves, Emissive, Instance, Medium, Mesh, Scene
 from scenes.canonical.values import Matrix, Rgb, RigidTrack
 from scenes.formats.geometry.orientation import is_closed
 from scenes.formats.geometry.transform_stack import track_times
@@ -25,9 +25,11 @@ def part_key(instance: Instance) -> PartKey:
     return *parts, instance.one_sided, instance.interior, instance.exterior
 
 
-def shared_parts(scene: Scene) -> frozenset[PartKey]:
-    """Meshes that several instances use and that do not emit; lamps cannot be instances of objects."""
-    counts = Counter(part_key(one) for one in scene.instances if isinstance(one.shape, Mesh) and not shines(one))
+def shared_parts(scene: Scene, curves: bool = True) -> frozenset[PartKey]:
+    """Meshes, and curves if asked for, that several instances use and that do not emit; lamps cannot be instances of
+    objects."""
+    kinds = Mesh | Curves if curves else Mesh
+    counts = Counter(part_key(one) for one in scene.instances if isinstance(one.shape, kinds) and not shines(one))
     return frozenset(key for key, count in counts.items() if count > 1)
 
 

@@ -119,7 +119,12 @@ class LuxMediaReader(SceneReader):
         return self.volumes.get(name)
 
     def sides(self) -> tuple[Medium | None, Medium | None]:
-        return (None, None) if self.attributes.interior is None else super().sides()
+        """Behind the volume of a shape without an exterior is that of the camera, as in LuxCore."""
+        inside, outside = super().sides()
+        if inside is None:
+            return None, None
+        around = self.drawn(self.medium)
+        return inside, outside or (around if around != inside else None)
 
     def read_shape(self, directive: Directive) -> None:
         given = self.attributes.material

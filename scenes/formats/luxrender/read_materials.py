@@ -125,10 +125,8 @@ class LuxSurfaces(SurfaceFactory):
         facets = self._facets(parameters, 0.001) if rough else Facets((0.0, 0.0))
         if "cauchyb" in parameters and self.scalar(parameters, "cauchyb", 0.0):
             self.report.add(str(parameters.place), "dispersion (cauchyb)", "one index for all colours")
-        thin = parameters.truth("architectural", False)
-        if thin:
-            self.report.add(str(parameters.place), "architectural glass", "a pane, which reflects as much at its back")
-        return Glass(*parts, self.scalar(parameters, "index", 1.5), facets.roughness, thin, alpha=facets.alpha)
+        thin, index = parameters.truth("architectural", False), self.scalar(parameters, "index", 1.5)
+        return Glass(*parts, index, facets.roughness, thin, alpha=facets.alpha, front_only=thin)
 
     def _glass_of_volumes(self, parameters: Parameters) -> Material:
         made = self._glass(parameters)

@@ -201,6 +201,8 @@ class LuxWriter(LuxSurfaceWriter, SceneWriter):
         invisible = is_nothing(instance.material) and emission is None
         lines = [f'NamedMaterial "{self.material(self.nothing() if invisible else instance.material)}"']
         if borders_media(instance):
+            if instance.exterior is None and self.medium not in (None, instance.interior):
+                self.report.add(instance.name or "shape", "vacuum behind a medium within another", "the medium around")
             lines += [f'Interior "{self._volume(instance.interior)}"', f'Exterior "{self._volume(instance.exterior)}"']
         if emission is not None:
             off = '"float gain" [ 1 ] "float power" [ 0 ] "float efficacy" [ 0 ]'

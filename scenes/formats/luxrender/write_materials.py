@@ -137,7 +137,7 @@ class LuxSurfaceWriter(SurfaceWriter):
         parts.append(f'"float index" [ {number(material.ior)} ]')
         if material.roughness != (0.0, 0.0):
             return "roughglass", [*parts, self.facets(material)]
-        if material.thin:
+        if material.thin and not material.front_only:
             front = reflectance_of_index(grey(material.ior), grey(0.0))[0]
             became = (
                 f"one in LuxCore that reflects {front:.3g} at its front and lets all through, and nothing at its back"

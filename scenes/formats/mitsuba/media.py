@@ -11,7 +11,7 @@ from collections.abc import Callable
 import numpy as np
 
 from scenes.canonical import Medium, Rgb
-from scenes.formats.appearance.media import filled, made_medium
+from scenes.formats.appearance.media import made_medium
 from scenes.formats.appearance.media_presets import mitsuba_medium
 from scenes.formats.appearance.spectra import grey, rgb
 from scenes.formats.losses import LossReport
@@ -31,13 +31,13 @@ class MitsubaMedia:
         modern: whether the file is one of Mitsuba 2 or 3.
     """
 
-    def __init__(self, report: LossReport, find: Callable[[XmlNode], XmlNode]) -> None:
+    def __init__(self, report: LossReport, find: Callable[..., XmlNode]) -> None:
         self.report, self.find = report, find
         self.modern = False
         self._made: dict[int, tuple[XmlNode, Medium | None]] = {}
 
     def read(self, node: XmlNode) -> Medium | None:
-        """The medium of an element; None for one that is left out, which is reported, or that is empty."""
+        """The medium of an element; None for one that is left out, which is reported."""
         if id(node) not in self._made:
             self._made[id(node)] = node, self._read(node)
         return self._made[id(node)][1]
@@ -62,7 +62,7 @@ class MitsubaMedia:
             if name in properties:
                 properties.asked.add(name)
                 self.report.hint(properties.where, f"{name} of a medium", "the renderer's own choice")
-        made = filled(made_medium(absorption, scattering, g, properties.where, properties.number("scale", 1.0)))
+        made = made_medium(absorption, scattering, g, properties.where, properties.number("scale", 1.0))
         properties.left_over()
         return made
 

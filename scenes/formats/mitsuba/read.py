@@ -13,7 +13,7 @@ from scenes.canonical import (
     Scene,
     SceneError,
 )
-from scenes.formats.appearance.media import as_drawn_by
+from scenes.formats.appearance.media import as_drawn_by, settled
 from scenes.formats.geometry.conventions import duration_s
 from scenes.formats.losses import LossReport
 from scenes.formats.mitsuba.media import MitsubaMedia
@@ -151,12 +151,13 @@ class MitsubaReader(MitsubaSettings):
             raise SceneError(f"{node.place}: expected a name of something before it, got {name!r}")
         return self.names[name]
 
-    def find(self, reference: XmlNode) -> XmlNode:
-        """The element to which a reference refers; for an unknown name a grey or empty one, which is reported."""
+    def find(self, reference: XmlNode, medium: bool = False) -> XmlNode:
+        """The element to which a reference refers; for an unknown name a grey or empty one, which is reported, or none
+        where a ``medium`` alone is without a name."""
         name, part = reference.get("id"), reference.get("name")
         if name in self.names:
             return self.names[name]
-        tag = "medium" if part in _MEDIA else "texture" if part else "bsdf"
+        tag = "medium" if medium or part in _MEDIA else "texture" if part else "bsdf"
         became = "vacuum" if tag == "medium" else "grey"
         self.report.add(str(reference.place), f"{name!r}, which no earlier element has as its name", became)
         kind = "diffuse" if tag == "bsdf" else MISSING
@@ -208,5 +209,6 @@ def scene_of(reader: MitsubaReader, path: Path) -> Scene:
     lasts = duration_s(reader.camera, reader.instances)
     scene = Scene(reader.camera, *parts, medium=reader.medium, materials=dict(reader.materials), name=Path(path).stem,
                   duration_s=lasts)  # fmt: skip
+    scene = settled(scene, report)
     drawn = reader.drawn_by in (_OF_MEDIA if reader.media.modern else _OF_MEDIA_0)
     return scene if drawn else as_drawn_by(scene, reader.drawn_by, Path(path).name, report)

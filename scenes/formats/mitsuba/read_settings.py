@@ -106,7 +106,7 @@ class MitsubaSettings:
         kind, properties = node.get("type"), Properties(node, self.report)
         self.medium = None
         for child in properties.rest:
-            node = self.media.find(child) if child.tag == "ref" else child
+            node = self.media.find(child, True) if child.tag == "ref" else child
             if node.tag in ("film", "sampler"):
                 self.setting(node)
             elif node.tag == "medium":

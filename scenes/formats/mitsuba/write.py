@@ -83,7 +83,7 @@ class MitsubaWriter(MitsubaCurveWriter):
             self.report.add(scene.name or "scene", "a background that lights nothing", "one that lights")
         if scene.ambient != (0.0, 0.0, 0.0):
             self.report.add(scene.name or "scene", "constant ambient light")
-        self.shared = shared_parts(scene)
+        self.shared = shared_parts(scene, curves=not self.modern)  # whose radii are not scaled by transforms
         for instance in scene.instances:
             self._instance(instance)
 

@@ -38,6 +38,7 @@ from scenes.canonical import (
 from scenes.canonical.textures import WHITE
 from scenes.formats.appearance.facets import with_even_facets
 from scenes.formats.appearance.folding import height_of, mean_of
+from scenes.formats.appearance.glass import lose_rays
 from scenes.formats.appearance.mixtures import added_metal, is_nothing, lobes_of
 from scenes.formats.appearance.normals import is_flat, map_of, scaled_normals
 from scenes.formats.appearance.simpler import simpler
@@ -242,8 +243,7 @@ class MitsubaSurfaceWriter(ElementWriter):
             self.put(made, "float", "alphaV", number(alphas[1]))
 
     def _glass(self, material: Glass, where: str) -> Element:
-        if material.spread_deg:
-            self.report.add(where, "rays spread about the perfect ones", "clear glass")
+        lose_rays(material, where, self.report)
         rough = material.roughness != (0.0, 0.0)
         if rough and material.thin:
             self.report.add(where, "a rough pane", "a clear one")

@@ -9,7 +9,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 from scenes.canonical import Medium
-from scenes.formats.appearance.media import filled, made_medium
+from scenes.formats.appearance.media import made_medium
 from scenes.formats.appearance.media_presets import pbrt_medium
 from scenes.formats.appearance.spectra import grey
 from scenes.formats.directives.reader import Attributes, typed, word
@@ -48,7 +48,7 @@ class PbrtMedia:
         name, parameters = typed(directive)
         where, kind = str(directive.place), parameters.text("type", "")
         if kind == "homogeneous":
-            self.named[name] = filled(self._homogeneous(parameters, where))
+            self.named[name] = self._homogeneous(parameters, where)
             return parameters
         parameters.asked.update(parameters.given)
         self.named[name] = None

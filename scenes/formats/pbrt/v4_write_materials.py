@@ -33,6 +33,7 @@ from scenes.canonical.textures import WHITE
 from scenes.formats.appearance.coats import with_bounces
 from scenes.formats.appearance.facets import Facets
 from scenes.formats.appearance.folding import folded, mean_of
+from scenes.formats.appearance.glass import lose_rays
 from scenes.formats.appearance.mixtures import added_metal, dimmed, lobes_of
 from scenes.formats.appearance.spectra import grey
 from scenes.formats.directives.surface_writer import Kind, plain_line
@@ -114,8 +115,7 @@ class PbrtV4SurfaceWriter(PbrtSurfaceWriter):
         return "conductor", [self.texture(reflectance, "reflectance"), self.unmapped(facets)]
 
     def _glass(self, material: Glass, where: str) -> tuple[str, list[str]]:
-        if material.spread_deg:
-            self.report.add(where, "rays spread about the perfect ones", "clear glass")
+        lose_rays(material, where, self.report)
         if material.reflectance != WHITE or material.transmittance != WHITE:
             self.report.add(where, "coloured glass", "clear glass")
         index = f'"float eta" [ {number(material.ior)} ]'

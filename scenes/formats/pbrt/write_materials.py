@@ -28,6 +28,7 @@ from scenes.canonical import (
 from scenes.canonical.textures import WHITE
 from scenes.formats.appearance.facets import Facets
 from scenes.formats.appearance.folding import folded, product_of
+from scenes.formats.appearance.glass import lose_rays
 from scenes.formats.appearance.indices import mean_reflectance
 from scenes.formats.appearance.mixtures import dimmed, is_nothing
 from scenes.formats.appearance.spectra import grey, rgb
@@ -117,8 +118,7 @@ class PbrtSurfaceWriter(SurfaceWriter):
     def _glass(self, material: Glass, where: str) -> tuple[str, list[str]]:
         if material.thin:
             self.report.add(where, "a pane without thickness", "clear glass")
-        if material.spread_deg:
-            self.report.add(where, "rays spread about the perfect ones", "clear glass")
+        lose_rays(material, where, self.report)
         parts = [self.texture(material.reflectance, "Kr"), self.texture(material.transmittance, "Kt")]
         parts.append(f'"float eta" [ {number(material.ior)} ]')
         return "glass", parts + ([self.unmapped(material)] if material.roughness != (0.0, 0.0) else [])

@@ -270,3 +270,17 @@ def test_curves_come_back_from_usd(basis: str, kind: str, tmp_path: Path) -> Non
     wanted = dataclasses.replace(curves, kind="tube") if kind == "cylinder" else curves
     assert difference(found.instances[0].shape, dataclasses.replace(wanted, source="")) is None
     assert lost == (["curves of the kind 'cylinder', which face the viewer"] if kind == "cylinder" else [])
+
+
+@pytest.mark.parametrize(("name", "word"), [("pbrt", '"curve"'), ("pbrt4", '"curve"'), ("luxrender", '"plymesh"'),
+                                            ("mitsuba", 'type="ply"')])  # fmt: skip
+def test_curves_of_several_instances_are_written_once(name: str, word: str, tmp_path: Path) -> None:
+    one = scene_of(some("bspline", 6, 5))
+    places = [np.diag([1.0, 1.0, 1.0 + number, 1.0]) for number in range(3)]
+    instances = tuple(dataclasses.replace(one.instances[0], to_world=place) for place in places)
+    wanted = dataclasses.replace(one, instances=instances)
+    file = tmp_path / ("a.xml" if name == "mitsuba" else "a.lxs" if name == "luxrender" else "a.pbrt")
+    read, _ = through(wanted, file, name)
+    assert file.read_text().count(word) == (2 if "pbrt" in name else 1)
+    assert len(read.instances) == 3 and read.instances[0].shape is read.instances[2].shape
+    assert "pbrt" not in name or difference(wanted.instances, read.instances) is None

@@ -29,7 +29,9 @@ from scenes.canonical import (
     Texture,
 )
 from scenes.formats.appearance.mixtures import NOTHING, lets_through
+from scenes.formats.comparison import difference
 from scenes.formats.conversion import load_scene_file, save_scene_file
+from scenes.formats.drawable import drawable
 from scenes.formats.losses import LossReport
 from tests.scenes.formats.files import HEAD, drawn, seen
 from tests.scenes.formats.test_light import even, furnace
@@ -116,13 +118,23 @@ def test_the_losses_of_holes_and_panes_are_those_of_luxcore(tmp_path: Path) -> N
     ]
 
 
-def test_architectural_glass_of_luxrender_is_a_loss(tmp_path: Path) -> None:
+def test_architectural_glass_of_luxrender_is_a_loss_elsewhere(tmp_path: Path) -> None:
     body = 'Material "glass" "string type" ["glass"] "bool architectural" ["true"]\n'
     shape = 'Shape "trianglemesh" "integer indices" [0 1 2] "point P" [0 0 0 1 0 0 0 1 0]\n'
     (tmp_path / "a.lxs").write_text(HEAD + body + shape)
     report = LossReport()
-    assert load_scene_file(tmp_path / "a.lxs", None, report).instances[0].material == Glass(thin=True)
-    assert [loss.what for loss in report.losses] == ["architectural glass"]
+    scene = load_scene_file(tmp_path / "a.lxs", None, report)
+    assert scene.instances[0].material == Glass(thin=True, front_only=True)
+    save_scene_file(scene, tmp_path / "b.lxs", None, report)
+    assert not [loss for loss in report.losses if loss.picture]
+    assert difference(scene.instances, load_scene_file(tmp_path / "b.lxs").instances) is None
+    for name in ("pbrt", "pbrt4", "mitsuba", "mitsuba3", "gltf"):
+        report = LossReport()
+        save_scene_file(scene, tmp_path / f"a.{name}", name, report)
+        assert "architectural glass" in [loss.what for loss in report.losses]
+    report = LossReport()
+    drawable(scene, report)
+    assert "architectural glass" in [loss.what for loss in report.losses]
 
 
 def test_a_perfect_mirror_in_a_mixture_of_mitsuba_05_keeps_its_light(tmp_path: Path) -> None:

@@ -94,16 +94,6 @@ def test_media_of_pbrt_may_be_made_after_their_names_are_given(tmp_path: Path) -
     assert scene.medium == scene.instances[0].interior == Medium((1.0, 2.0, 3.0))
 
 
-@pytest.mark.parametrize(("version", "scattering"), [("3", 9.0), ("4", 0.74)])
-def test_presets_of_pbrt_beside_coefficients(version: str, scattering: float, tmp_path: Path) -> None:
-    """Coefficients that are given count in version 3, the preset in version 4."""
-    head = V3.format('"string preset" "Skin1" "rgb sigma_s" [ 9 9 9 ]') + "WorldBegin\n"
-    head += 'Material "diffuse"\n' if version == "4" else ""
-    scene, _ = pbrt(tmp_path, 'MediumInterface "fog" ""\nShape "sphere"\n', head)
-    assert scene.instances[0].interior.scattering[0] == scattering
-    assert scene.instances[0].interior.absorption == (0.032, 0.17, 0.48)
-
-
 @pytest.mark.parametrize("kind", ["homogeneous", "homogenous"])
 def test_volumes_of_luxrender(kind: str, tmp_path: Path) -> None:
     (tmp_path / "a.lxs").write_text(f"""
@@ -128,7 +118,8 @@ def test_volumes_of_luxrender(kind: str, tmp_path: Path) -> None:
     scene = load_scene_file(tmp_path / "a.lxs", None, report)
     assert not report.losses and scene.medium == Medium((1.0, 2.0, 3.0), (0.1, 0.2, 0.3))
     water, plain = scene.instances
-    assert close(water.interior, Medium((0.5 * math.log(2.0), math.log(2.0), 0.0))) and water.exterior is None
+    assert close(water.interior, Medium((0.5 * math.log(2.0), math.log(2.0), 0.0)))
+    assert water.exterior == scene.medium  # behind it, LuxCore goes on with the medium around
     assert isinstance(water.material, Glass) and water.material.ior == pytest.approx(1.33)
     assert plain.interior is None and plain.exterior is None  # no border: the fog goes on
     (tmp_path / "a.lxs").write_text((tmp_path / "a.lxs").read_text().replace('"multi"', '"single"'))
@@ -262,7 +253,9 @@ def test_media_are_carried_between_all_formats(
         assert difference(tuple(wanted), tuple((one.interior, one.exterior) for one in found.instances)) is None
         assert [is_nothing(one.material) for one in found.instances] == [True, False, True, True, True, False]
         lost = [loss for loss in report.losses if loss.picture and "sphere" not in loss.what]
-        assert all("Schlick" in f"{loss}" for loss in lost) and bool(lost) == ("luxrender" in f"{source} {target}")
+        known = ("Schlick", "vacuum behind") if around else ("Schlick",)  # in LuxCore there is none within fog
+        assert all(any(word in f"{loss}" for word in known) for loss in lost)
+        assert bool(lost) == ("luxrender" in f"{source} {target}")
 
 
 @pytest.mark.parametrize("name", ["a.usda", ""])
