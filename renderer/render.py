@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 from os import PathLike, fspath
 from typing import Literal
 
@@ -55,6 +56,7 @@ def render(
     require(width_px >= 1 and height_px >= 1, "size", "at least one pixel", size)
     check_frame_size(width_px, height_px, 1)
     plan = SamplePlan(samples_per_pixel, point_set, seed, space_filter)
-    found, _ = catalog.load_seen(scene if isinstance(scene, Scene) else fspath(scene), look or Look())
+    look = dataclasses.replace(look or Look(), pose_s=time_s)
+    found, _ = catalog.load_seen(scene if isinstance(scene, Scene) else fspath(scene), look)
     renderer = Renderer(found, threads=threads or None, seed=seed)
     return pictures(renderer, plan, width_px, height_px)(0, time_s).numpy()

@@ -107,6 +107,7 @@ def load_file(
     integrator: IntegratorName = "whitted",
     up: Up | None = None,
     camera: str = "",
+    pose_s: float = 0.0,
 ) -> tuple[Scene, tuple[str, ...]]:
     """The scene of a file, converted to what this project's renderer supports, and the losses.
 
@@ -116,6 +117,7 @@ def load_file(
         integrator: integrator for the scene; path tracing supports more materials.
         up: upward axis of a model, in place of that of its file.
         camera: name of a camera of a model; the first one if empty.
+        pose_s: as in :class:`Look`.
 
     Raises:
         SceneError: the file cannot be read, or has no camera of this name.
@@ -129,7 +131,7 @@ def load_file(
 
     losses = LossReport()
     if Path(name).suffix.lower() in MODEL_ENDINGS:
-        found = model_scene(Path(name), losses, up, integrator == "path", camera)
+        found = model_scene(Path(name), losses, up, integrator == "path", camera, pose_s)
     elif camera:
         raise SceneError(f"camera: expected six numbers, since {name} has no cameras by name, got {camera!r}")
     else:
@@ -156,6 +158,8 @@ class Look:
         focal_distance: distance to the plane in focus, scene units; None for that of ``camera``'s target if
             ``lens_radius`` is given, else for that of the scene.
         camera_keys: file with keys of a moving camera (:mod:`scenes.camera_keys`).
+        pose_s: time since the start of the animation of a model at which parts are shown that do not move rigidly, such
+            as skins and morph targets, seconds.
     """
 
     up: Up | None = None
@@ -168,6 +172,7 @@ class Look:
     lens_radius: float | None = None
     focal_distance: float | None = None
     camera_keys: Path | None = None
+    pose_s: float = 0.0
 
 
 def load_seen(
@@ -193,8 +198,9 @@ def load_seen(
     ending = "" if isinstance(scene, Scene) or str(scene) in SCENES else Path(scene).suffix.lower()
     later = camera_path if ending not in ("", SESSION_ENDING) and look != Look() else ""
     name, place = (look.camera, None) if isinstance(look.camera, str) else ("", look.camera)
-    if ending in MODEL_ENDINGS and (name or look.up):
-        found, losses = load_file(str(scene), "" if later else camera_path, look.integrator, look.up, name)
+    if ending in MODEL_ENDINGS:
+        path = "" if later else camera_path
+        found, losses = load_file(str(scene), path, look.integrator, look.up, name, look.pose_s)
     elif name:
         raise SceneError(f"camera: expected six numbers, since only models have cameras by name, got {name!r}")
     else:

@@ -2,11 +2,16 @@
 
 from __future__ import annotations
 
+import dataclasses
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 from analysis.command import limits
 from analysis.study.view_options import ViewOptions
 from tsar.config import closed_choices, require
+
+if TYPE_CHECKING:
+    from scenes.catalog import Look
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -22,14 +27,21 @@ class FilmOptions(ViewOptions):
     """Height, pixels; in place of size."""
     crop: tuple[int, int, int, int] | None = None
     """Part of the picture to render: left column, upper row, width and height, pixels."""
+    time_s: float = 0.0
+    """Animation time of the first frame, seconds."""
 
     def __post_init__(self) -> None:
         super().__post_init__()
         require(not self.size or len(self.sides_px) == 2, "size", "such as 800x600", self.size)
         sides = (0, limits.SIDES_PX[1])
-        limits.within(self, sides_px=limits.SIDES_PX, width_px=sides, height_px=sides)
+        limits.within(self, sides_px=limits.SIDES_PX, width_px=sides, height_px=sides, time_s=limits.TIMES_S)
         two = self.size and (self.width_px or self.height_px)
         require(not two, "size", "none together with width_px and height_px", self.size)
+
+    @property
+    def look(self) -> Look:
+        """As of every view, and parts that do not move rigidly as at the time of the first frame."""
+        return dataclasses.replace(super().look, pose_s=self.time_s)
 
     @property
     def sides_px(self) -> tuple[int, ...]:

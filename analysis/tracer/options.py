@@ -111,8 +111,6 @@ class TileOptions(FilmOptions):
     """Point set that places the samples in the pixel and in the shutter's time."""
     space_filter: Literal["box", "gaussian"] = "gaussian"
     """Reconstruction filter over the picture."""
-    time_s: float = 0.0
-    """Animation time of the first frame, seconds."""
     seed: Seed = 0
     chunk_tiles: int = 16
     """Tiles of 16 x 16 pixels in one task of a worker."""
@@ -132,7 +130,6 @@ class TileOptions(FilmOptions):
         limits.within(
             self,
             samples=(1, 1 << 16),
-            time_s=limits.TIMES_S,
             seed=limits.SEEDS,
             chunk_tiles=(1, 1 << 16),
             study=(1, 64),

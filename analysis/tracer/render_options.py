@@ -51,8 +51,6 @@ class RenderOptions(FilmOptions):
     time_filter: Literal["box", "triangle"] = "box"
     """Reconstruction filter over the time the shutter is open, for point sets."""
     seed: Seed = 0
-    time_s: float = 0.0
-    """Animation time of the first frame, seconds."""
     frames: int = 1
     """Number of frames."""
     fps: float = 30.0
@@ -80,7 +78,6 @@ class RenderOptions(FilmOptions):
             error_target=(0.0, 1.0),
             frames=(1, 10**6),
             fps=(1e-6, 1e5),
-            time_s=limits.TIMES_S,
             phase=(0.0, 1.0),
             seed=limits.SEEDS,
             threads=limits.THREADS,

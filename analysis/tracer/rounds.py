@@ -16,13 +16,13 @@ from analysis.storage.reference import content_hash
 from analysis.storage.source import code_hash
 from analysis.storage.store import Store
 from analysis.tracer.layers import scene_layers
+from analysis.tracer.posing import Posing
 from analysis.tracer.render_options import RenderOptions
 from renderer.film.files import count_nonfinite, write_image
 from renderer.film.layers import write_layers
 from renderer.frames import cut, tiles_of
 from renderer.rounds import Made, Rounds, render_rounds
 from renderer.sampling.plan import SamplePlan
-from renderer.trace import Renderer
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -38,10 +38,10 @@ class StillRounds:
     """
 
     def __init__(
-        self, renderer: Renderer, plan: SamplePlan, options: RenderOptions, size_px: tuple[int, int], bars: Bars
+        self, posing: Posing, plan: SamplePlan, options: RenderOptions, size_px: tuple[int, int], bars: Bars
     ) -> None:
         """Shows a bar of all samples that may be needed."""
-        self.renderer, self.plan, self.options, self.size_px = renderer, plan, options, size_px
+        self.posing, self.plan, self.options, self.size_px = posing, plan, options, size_px
         self.frames = Task()
         tiles = len(tiles_of(options.crop or (0, 0, *size_px), size_px[0]))
         self._budget = tiles * 256 * options.samples
@@ -49,7 +49,7 @@ class StillRounds:
         self._made: Made | None = None
         self._time_s = 0.0
         code = code_hash(StillRounds, render_rounds)
-        self._key = content_hash((options.job, renderer.scene, code))
+        self._key = content_hash((options.job, posing.content, code))
 
     def picture(self, number: int, time_s: float) -> Tensor:
         """The still of the given number, continued from an interrupted run of the same job."""
@@ -65,8 +65,9 @@ class StillRounds:
             with store.make(name) as making:
                 making.path.write_bytes(_stored(state))
 
+        renderer = self.posing.at(time_s)
         self._made = render_rounds(
-            self.renderer, self.plan, self.options.in_rounds, *self.size_px, time_s, self.renderer.shutter_s, number,
+            renderer, self.plan, self.options.in_rounds, *self.size_px, time_s, renderer.shutter_s, number,
             self.options.error_target, self.options.crop, state, done,
         )  # fmt: skip
         self._task.reach(start + self._budget)
@@ -83,7 +84,7 @@ class StillRounds:
 
     def _layers(self, made: Made) -> Mapping[str, NDArray]:
         width, height = self.size_px
-        layers = scene_layers(self.renderer, width, height, self._time_s, 1.0 / self.options.fps)
+        layers = scene_layers(self.posing.at(self._time_s), width, height, self._time_s, 1.0 / self.options.fps)
         crop = self.options.crop
         whole = {name: cut(torch.from_numpy(np.ascontiguousarray(part)), crop).numpy() for name, part in layers.items()}
         return whole | {"samples": made.samples.numpy(), "variance": made.variance.numpy()}

@@ -23,6 +23,7 @@ from analysis.tracer.render_options import RenderOptions
 
 if TYPE_CHECKING:
     import pandas as pd
+    from torch import Tensor
 
     from analysis.tracer.jobs import PreparedJob
     from scenes.canonical import Scene
@@ -34,11 +35,14 @@ def opened(options: RenderOptions) -> tuple[Scene, tuple[str, ...]]:
     Raises:
         InputError: there is no such scene, or its file cannot be read.
     """
+    from analysis.tracer.posing import ANEW
     from scenes import catalog
+    from scenes.models.scenes_of_models import is_posed
 
     with bad_input():
         scene, losses = catalog.load_seen(options.scene, options.look, options.phase)
-        return scene, tuple(map(str, losses))
+        more = [ANEW] if options.frames > 1 and is_posed(options.scene) else []
+        return scene, (*map(str, losses), *more)
 
 
 def losses_of(options: TileOptions) -> tuple[str, ...]:
@@ -70,6 +74,7 @@ def render(options: RenderOptions, scene: Scene) -> dict[str, Any]:
     from analysis.storage.reference import content_hash
     from analysis.storage.source import brought, code_hash
     from analysis.tracer.denoising import StillOf, denoised
+    from analysis.tracer.posing import Posing
     from analysis.tracer.rounds import StillRounds
     from analysis.tracer.stills import render_stills
     from renderer.film.files import FilmError
@@ -84,29 +89,32 @@ def render(options: RenderOptions, scene: Scene) -> dict[str, Any]:
         size = options.size_px((scene.film.width_px, scene.film.height_px))
         check_frame_size(*size, 1 if options.samples else options.samples_per_axis)
         own_results(options.out, ["film.mp4"] if options.format == "mp4" else [])
-        renderer = Renderer(scene, options.device, options.threads or None, seed=options.seed)
+        posing = Posing(options, scene)
         kinds = options.point_set, options.seed, options.space_filter
         count = options.samples // (options.in_rounds or 1)
         plan = (
             SamplePlan(count, *kinds, time_filter=options.time_filter, shift=options.shift) if options.samples else None
         )
-        picture = pictures(renderer, plan or options.samples_per_axis, *size, options.crop)
+
+    def picture(number: int, time_s: float) -> Tensor:
+        sampling = plan or options.samples_per_axis
+        return pictures(posing.at(time_s), sampling, *size, options.crop)(number, time_s)
 
     def cleared(made: StillOf) -> StillOf:
-        return denoised(made, renderer, size, options.crop) if options.denoise else made
+        return denoised(made, posing.at, size, options.crop) if options.denoise else made
 
     points = [(POINT_SETS, options.point_set)] if options.samples else []
     added = brought(*points, *tables_of(options.scene))
     key = content_hash(
-        (options.job, scene, code_hash(Renderer, pictures, render_stills, StillRounds, denoised), *added)
+        (options.job, posing.content, code_hash(Renderer, pictures, render_stills, StillRounds, denoised), *added)
     )
     out, ending = options.out, options.still_ending
     with bad_input(), full_disk(out, FilmError), bars() as shown:
         times = dict(enumerate(options.times_s))
         if plan is not None and options.in_rounds:
-            made = StillRounds(renderer, plan, options, size, shown)
-            picture = cleared(made.picture)
-            rendered, nonfinite = render_stills(picture, times, out, ending, key, made.frames, made.write)
+            made = StillRounds(posing, plan, options, size, shown)
+            still = cleared(made.picture)
+            rendered, nonfinite = render_stills(still, times, out, ending, key, made.frames, made.write)
         else:
             task = shown.task("frames", options.frames)
             rendered, nonfinite = render_stills(cleared(picture), times, out, ending, key, task)

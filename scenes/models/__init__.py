@@ -17,17 +17,17 @@ from scenes.models.plain_files import read_plain
 from scenes.models.smoothing import smoothed
 from scenes.models.sources import Sources
 
-Read = Callable[[Sources, LossReport, bool], Model]
+Read = Callable[[Sources, LossReport, bool, float], Model]
 
 
 def _parts_by(read: Callable[[Sources, LossReport], tuple[Instance, ...]]) -> Read:
-    return lambda sources, report, facets: Model(read(sources, report))
+    return lambda sources, report, facets, time_s: Model(read(sources, report))
 
 
-def _read_usd(sources: Sources, report: LossReport, facets: bool) -> Model:
+def _read_usd(sources: Sources, report: LossReport, facets: bool, time_s: float) -> Model:
     from scenes.models.usd_files import read_usd  # needs the extra usd
 
-    return read_usd(sources, report, facets)
+    return read_usd(sources, report, facets, time_s)
 
 
 USD_ENDINGS = (".usd", ".usda", ".usdc", ".usdz")
@@ -38,9 +38,10 @@ _READERS: dict[str, Read] = {
 MODEL_ENDINGS = tuple(_READERS)
 
 _KEPT_MAX = 32
-_Kept = tuple[dict[Path, FileState | None], Model, tuple[Loss, ...]]
-_kept: dict[tuple[Path, bool], _Kept] = {}
-"""Cache of models, by path and facets, with the files on which each depends."""
+_Kept = tuple[float, dict[Path, FileState | None], Model, tuple[Loss, ...]]
+_kept: dict[tuple[Path, bool, bool], _Kept] = {}
+"""Cache of models at their start and at one later time, by path, facets and whether it is later; with the time and the
+files on which each depends."""
 
 
 def read_model(path: Path, report: LossReport | None = None, facets: bool = False) -> tuple[Instance, ...]:
@@ -66,8 +67,12 @@ def read_model(path: Path, report: LossReport | None = None, facets: bool = Fals
     return read_whole(path, report, facets).parts
 
 
-def read_whole(path: Path, report: LossReport | None = None, facets: bool = False) -> Model:
-    """A model with its lights and cameras; arguments as for :func:`read_model`.
+def read_whole(path: Path, report: LossReport | None = None, facets: bool = False, time_s: float = 0.0) -> Model:
+    """A model with its lights and cameras.
+
+    Args:
+        path, report, facets: see :func:`read_model`.
+        time_s: time since the start of the animation at which parts are shown that do not move rigidly, seconds.
 
     Raises:
         ModuleNotFoundError: USD needs the package usd-core.
@@ -75,26 +80,41 @@ def read_whole(path: Path, report: LossReport | None = None, facets: bool = Fals
             vertices; or one of its texture or material files is missing.
     """
     path, report = Path(path), report or LossReport()
-    files, kept, losses = _kept.pop((path, facets), ({}, Model(()), ()))
-    if not files or any(state_of(file) != state for file, state in files.items()):
-        sources, found = Sources(path), LossReport()
-        kept = _read(path, sources, found, facets)
-        files, losses = sources.files, found.losses
-    _kept[path, facets] = files, kept, losses
-    if len(_kept) > _KEPT_MAX:
-        del _kept[next(iter(_kept))]
+    _, _, model, losses = _at(path, facets, 0.0)
+    if model.posed and time_s != 0.0:
+        _, _, model, losses = _at(path, facets, time_s)
     for loss in losses:
         report.add(loss.where, loss.what, loss.became, loss.picture)
+    return model
+
+
+def files_of(path: Path) -> list[Path]:
+    """The files that were found for a model; raises as :func:`read_whole`."""
+    path = Path(path)
+    read_whole(path)
+    return sorted(file for file, state in _at(path, False, 0.0)[1].items() if state is not None)
+
+
+def _at(path: Path, facets: bool, time_s: float) -> _Kept:
+    key = path, facets, time_s != 0.0
+    kept = _kept.pop(key, None)
+    if kept is None or kept[0] != time_s or any(state_of(file) != state for file, state in kept[1].items()):
+        sources, found = Sources(path), LossReport()
+        model = _read(path, sources, found, facets, time_s)
+        kept = time_s, sources.files, model, found.losses
+    _kept[key] = kept
+    if len(_kept) > _KEPT_MAX:
+        del _kept[next(iter(_kept))]
     return kept
 
 
-def _read(path: Path, sources: Sources, report: LossReport, facets: bool) -> Model:
+def _read(path: Path, sources: Sources, report: LossReport, facets: bool, time_s: float) -> Model:
     if path.suffix.lower() not in _READERS:
         raise SceneError(f"model {path}: expected a file that ends in {', '.join(MODEL_ENDINGS)}")
     if not path.is_file():
         raise SceneError(f"model {path}: expected a file, found none")
     try:
-        model = _READERS[path.suffix.lower()](sources, report, facets)
+        model = _READERS[path.suffix.lower()](sources, report, facets, time_s)
     except ModuleNotFoundError:
         raise
     except SceneError as error:

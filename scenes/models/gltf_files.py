@@ -16,28 +16,29 @@ from scenes.canonical.values import vertices_of
 from scenes.formats.losses import LossReport
 from scenes.models.gltf_data import GltfData
 from scenes.models.gltf_materials import GltfMaterials, Painted
-from scenes.models.gltf_motion import GltfMotion, local_poses
+from scenes.models.gltf_morphs import Weights, morphed, weights_at_node
+from scenes.models.gltf_motion import GltfMotion
 from scenes.models.gltf_skins import bends, bent, joint_matrices
 from scenes.models.gltf_textures import GltfTextures
 from scenes.models.gltf_views import camera_at_node, light_at_node
 from scenes.models.json_records import misplaced
 from scenes.models.model import Model, ModelCamera
-from scenes.models.motion import Poses, rigid_track
+from scenes.models.motion import Pose, Poses, rigid_track
 from scenes.models.smoothing import unit_normals, with_corners
 from scenes.models.sources import Sources
 
 _KINDS = {0: "points", 1: "lines", 2: "lines", 3: "lines"}
 _READ = {"KHR_mesh_quantization", "KHR_texture_transform", "EXT_texture_webp", "KHR_lights_punctual"}
-_TYPES = {"NORMAL": ("VEC3",), "TEXCOORD": ("VEC2",), "COLOR": ("VEC3", "VEC4")}
+_TYPES = {"POSITION": ("VEC3",), "NORMAL": ("VEC3",), "TEXCOORD": ("VEC2",), "COLOR": ("VEC3", "VEC4")}
 _DEPTH_MAX = 256
 _Part = tuple[Mesh, Painted, bool]
 """A mesh, its material, and whether its back is drawn, too."""
 
 
-def read_gltf(sources: Sources, report: LossReport, facets: bool = False) -> Model:
+def read_gltf(sources: Sources, report: LossReport, facets: bool = False, time_s: float = 0.0) -> Model:
     """The file's scene, or all nodes if it names no scene; parts and cameras of animated nodes move rigidly.
 
-    Meshes with a skin have the pose of their joints at the start of the animation. Morph targets are ignored.
+    Skins, morph targets and nodes that grow are as at ``time_s``, seconds since the start of the animation.
 
     With ``facets`` materials are converted for path tracing, otherwise to Phong.
 
@@ -48,7 +49,7 @@ def read_gltf(sources: Sources, report: LossReport, facets: bool = False) -> Mod
     """
     data = GltfData(sources)
     _check_extensions(data, report)
-    return _Reader(data, report, facets).model()
+    return _Reader(data, report, facets, time_s).model()
 
 
 def _check_extensions(data: GltfData, report: LossReport) -> None:
@@ -64,24 +65,24 @@ def _check_extensions(data: GltfData, report: LossReport) -> None:
 class _Reader:
     """Reads nodes and meshes, each mesh once."""
 
-    def __init__(self, data: GltfData, report: LossReport, facets: bool) -> None:
-        self.data, self.report = data, report
+    def __init__(self, data: GltfData, report: LossReport, facets: bool, time_s: float) -> None:
+        self.data, self.report, self.pose = data, report, Pose(time_s, report)
         self.materials = GltfMaterials(data, GltfTextures(data, report), report, facets)
         self.motion = GltfMotion(data, report)
-        self._meshes: dict[int, list[_Part]] = {}
+        self._meshes: dict[tuple[int, Weights], list[_Part]] = {}
         self._parts: list[Instance] = []
         self._lights: list[Light] = []
         self._cameras: dict[str, ModelCamera] = {}
         self._world: dict[int, Matrix] = {}
         self._moving: set[int] = set()
-        self._skinned: list[tuple[dict[str, Any], str]] = []
+        self._skinned: list[tuple[int, str]] = []
 
     def model(self) -> Model:
         for root in self._roots():
-            self._node(root, np.eye(4)[None], np.eye(4), None, False, 0)
-        for node, name in self._skinned:
-            self._add_skinned(node, name)
-        return Model(tuple(self._parts), tuple(self._lights), self._cameras, "y")
+            self._node(root, np.eye(4)[None], np.eye(4), np.eye(4), None, False, 0)
+        for number, name in self._skinned:
+            self._add_skinned(number, name)
+        return Model(tuple(self._parts), tuple(self._lights), self._cameras, "y", self.pose.counts)
 
     def _roots(self) -> list[int]:
         scenes, count = self.data.items("scenes"), len(self.data.items("nodes"))
@@ -94,7 +95,7 @@ class _Reader:
         return [number for number in range(count) if number not in children]
 
     def _node(
-        self, number: int, above: Poses, frame: Matrix, track: RigidTrack | None, moving: bool, depth: int
+        self, number: int, above: Poses, frame: Matrix, now: Matrix, track: RigidTrack | None, moving: bool, depth: int
     ) -> None:
         """Adds what a node and its children hold.
 
@@ -102,6 +103,7 @@ class _Reader:
             number: index of the node.
             above: world transform of the nearest animated ancestor, at one or all times.
             frame: transform from the parent to that ancestor.
+            now: transform from the parent to the world at the time of the pose.
             track: rigid motion of that ancestor.
             moving: whether there is such an ancestor.
             depth: depth of the node.
@@ -112,16 +114,17 @@ class _Reader:
         if number in self._world:
             raise misplaced(f"nodes[{number}]", "a tree of nodes", f"node {number} twice")
         name = node.get("name", f"node{number}")
-        moved = self.motion.poses(number)
-        if moved is not None:
+        now = product(now, self.motion.poses(number, np.array([self.pose.time_s]))[0])
+        if self.motion.moves(number):
+            moved = self.motion.poses(number, self.motion.times_s)
             above, frame, moving = product(above, product(frame, moved)), np.eye(4), True
-            track = rigid_track(above, self.motion.times_s, name, self.report)
+            track = rigid_track(above, self.motion.times_s, name, self.pose)
         else:
-            frame = product(frame, local_poses(node)[0])
-        matrix = product(above[0], frame)
-        if not np.isfinite(above).all() or not np.isfinite(matrix).all():
+            frame = product(frame, self.motion.poses(number, np.zeros(1))[0])
+        matrix = now if moving and track is None else product(above[0], frame)
+        if not all(np.isfinite(one).all() for one in (above, matrix, now)):
             raise misplaced(f"nodes[{number}]", "a finite transform to the world", "one that overflows")
-        self._world[number] = matrix
+        self._world[number] = now
         if moving:
             self._moving.add(number)
         if "camera" in node:
@@ -130,62 +133,76 @@ class _Reader:
                 self.report.add(names, "a further camera of this name")
             self._cameras.setdefault(names, camera_at_node(self.data, node["camera"], matrix, track))
         if "KHR_lights_punctual" in node.get("extensions", {}):
-            self._add_light(number, matrix, name, moving)
+            self._add_light(number, now, name, moving)
         if "mesh" in node and "skin" in node:
-            self._skinned.append((node, name))
+            self._skinned.append((number, name))
         elif "mesh" in node:
             if abs(np.linalg.det(matrix[:3, :3])) == 0.0:
                 self.report.add(name, "a node without extent")
             else:
                 stem = self.data.sources.path.stem
-                parts = self._mesh(node["mesh"])
+                parts = self._mesh(node["mesh"], self._weights(number, name))
                 self._parts += [_placed(part, matrix, track, f"{stem}/{name}") for part in parts]
         for child in node.get("children", ()):
-            self._node(child, above, frame, track, moving, depth + 1)
+            self._node(child, above, frame, now, track, moving, depth + 1)
 
     def _add_light(self, number: int, matrix: Matrix, name: str, moving: bool) -> None:
         light = light_at_node(self.data, number, matrix, name, self.report)
         if light is not None and moving:
-            self.report.add(name, "a moving light", "the pose at its start")
+            self.pose.add(name, "a moving light")
         self._lights += [] if light is None else [light]
 
-    def _add_skinned(self, node: dict[str, Any], name: str) -> None:
+    def _add_skinned(self, number: int, name: str) -> None:
         """Adds the parts of a mesh that is bent by its joints; its node's own transform does not count."""
+        node = self.data.at("nodes", number)
         if not self._moving.isdisjoint(self.data.at("skins", node["skin"]).get("joints", ())):
-            self.report.add(name, "a skin that moves", "the pose at its start")
-        matrices = joint_matrices(self.data, node["skin"], self._world)
-        name = f"{self.data.sources.path.stem}/{name}"
-        self._parts += [_placed(part, np.eye(4), None, name) for part in self._mesh_parts(node["mesh"], matrices)]
+            self.pose.add(name, "a skin that moves")
+        weights, matrices = self._weights(number, name), joint_matrices(self.data, node["skin"], self._world)
+        name, parts = f"{self.data.sources.path.stem}/{name}", self._mesh_parts(node["mesh"], weights, matrices)
+        self._parts += [_placed(part, np.eye(4), None, name) for part in parts]
 
-    def _mesh(self, number: int) -> list[_Part]:
-        if number not in self._meshes:
-            self._meshes[number] = self._mesh_parts(number, None)
-        return self._meshes[number]
+    def _weights(self, number: int, name: str) -> Weights:
+        """The weights of the morph targets at a node at the time of the pose."""
+        animated = self.motion.weights(number, self.pose.time_s)
+        if animated is not None and len(self.motion.times_s):
+            self.pose.add(name, "morph targets that move")
+        return weights_at_node(self.data, number, animated)
 
-    def _mesh_parts(self, number: int, matrices: NDArray[np.float64] | None) -> list[_Part]:
+    def _mesh(self, number: int, weights: Weights) -> list[_Part]:
+        if (number, weights) not in self._meshes:
+            self._meshes[number, weights] = self._mesh_parts(number, weights, None)
+        return self._meshes[number, weights]
+
+    def _mesh_parts(self, number: int, weights: Weights, matrices: NDArray[np.float64] | None) -> list[_Part]:
         mesh = self.data.at("meshes", number)
         name = mesh.get("name", f"mesh{number}")
         made = [
-            self._primitive(primitive, name, f"meshes[{number}].primitives[{place}]", matrices)
+            self._primitive(primitive, name, f"meshes[{number}].primitives[{place}]", weights, matrices)
             for place, primitive in enumerate(mesh.get("primitives", ()))
         ]
         return [part for part in made if part is not None]
 
     def _primitive(
-        self, primitive: dict[str, Any], name: str, place: str, matrices: NDArray[np.float64] | None
+        self, primitive: dict[str, Any], name: str, place: str, weights: Weights, matrices: NDArray[np.float64] | None
     ) -> _Part | None:
         mode, attributes = primitive.get("mode", 4), primitive["attributes"]
         if mode in _KINDS or "POSITION" not in attributes:
             self.report.add(name, _KINDS.get(mode, "a primitive without positions"))
             return None
-        if primitive.get("targets"):
-            self.report.add(name, "morph targets")
-        points = self.data.numbers(attributes["POSITION"], "POSITION", ("VEC3",))
-        normals = self._of_vertices("NORMAL", attributes, len(points), place)
+
+        def of_vertices(attribute: str, count: int | None) -> NDArray[np.float64] | None:
+            values = self._of_vertices(attribute, attributes, count, place)
+            if values is None or not weights:
+                return values
+            return morphed(self.data, primitive["targets"], weights, attribute, values, place)
+
+        points = of_vertices("POSITION", None)
+        assert points is not None
+        normals = of_vertices("NORMAL", len(points))
         if matrices is not None:
             points, normals = bent(bends(self.data, attributes, matrices, len(points), place), points, normals)
-            if not np.isfinite(points).all():
-                raise misplaced(f"{place}.attributes.POSITION", "finite points of a skin", "some that overflow")
+        if not np.isfinite(points).all():
+            raise misplaced(f"{place}.attributes.POSITION", "finite points of a pose", "some that overflow")
         indices = primitive.get("indices")
         order = np.arange(len(points)) if indices is None else self.data.indices(indices, "indices")[:, 0]
         if len(order) and order.max() >= len(points):
@@ -194,8 +211,8 @@ class _Reader:
         if not len(faces):
             return None
 
-        sets = {index: self._of_vertices(f"TEXCOORD_{index}", attributes, len(points), place) for index in range(4)}
-        colors = self._of_vertices("COLOR_0", attributes, len(points), place)
+        sets = {index: of_vertices(f"TEXCOORD_{index}", len(points)) for index in range(4)}
+        colors = of_vertices("COLOR_0", len(points))
         material = primitive.get("material")
         doubled = material is not None and self.data.at("materials", material).get("doubleSided", False)
         painted = self.materials.painted(
@@ -212,14 +229,14 @@ class _Reader:
         return mesh, painted, doubled
 
     def _of_vertices(
-        self, attribute: str, attributes: dict[str, Any], count: int, place: str
+        self, attribute: str, attributes: dict[str, Any], count: int | None, place: str
     ) -> NDArray[np.float64] | None:
         """Values of the vertices; None without the attribute. Normals may be zero or not finite."""
         if attribute not in attributes:
             return None
         types = _TYPES[attribute.partition("_")[0]]
         values = self.data.numbers(attributes[attribute], attribute, types, finite=attribute != "NORMAL")
-        if len(values) != count:
+        if count not in (None, len(values)):
             raise misplaced(f"{place}.attributes.{attribute}", f"{count} elements", len(values))
         return values
 

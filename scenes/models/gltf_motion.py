@@ -1,4 +1,4 @@
-"""Animations of a glTF file as rigid motions of its nodes.
+"""Animations of a glTF file: transforms of its nodes and weights of its morph targets over time.
 
 Source: Khronos Group, "glTF 2.0 specification", section 3.11 and appendix C.
 """
@@ -36,6 +36,7 @@ def local_poses(values: dict[str, Any], count: int = 1) -> Poses:
     return found
 
 
+_TYPES = {"rotation": "VEC4", "weights": "SCALAR"}  # of values; those of others are VEC3
 _Channel = tuple[NDArray[np.float64], NDArray[np.float64], str, str]
 """Times of keys, their values, the interpolation, and the JSON path of the sampler."""
 
@@ -61,7 +62,7 @@ class GltfMotion:
         animation = data.at("animations", 0) if count else {}
         for number, channel in enumerate(animation.get("channels", ())):
             target = channel["target"]
-            if "node" not in target or target.get("path") not in _REST:
+            if "node" not in target or target.get("path") not in (*_REST, "weights"):
                 report.add(stem, f"an animation of {target.get('path', 'nothing')}")
                 continue
             samplers = animation.get("samplers", ())
@@ -83,10 +84,12 @@ class GltfMotion:
         require(sampler, self.data.records.sampler, place)
         kind = sampler.get("interpolation", "LINEAR")
         keys = self.data.numbers(sampler["input"], "times", ("SCALAR",))[:, 0]
-        values = self.data.numbers(sampler["output"], f"a {path}", ("VEC4" if path == "rotation" else "VEC3",))
+        values = self.data.numbers(sampler["output"], f"a {path}", (_TYPES.get(path, "VEC3"),))
         each = 3 if kind == "CUBICSPLINE" else 1
         if not len(keys):
             raise misplaced(f"{place}.input", "at least one time", "none")
+        if path == "weights" and len(values) and not len(values) % (len(keys) * each):
+            values = values.reshape(len(keys) * each, -1)  # one for each target
         if len(values) != len(keys) * each:
             raise misplaced(f"{place}.output", f"{each} elements for each of {len(keys)} times", len(values))
         if not (np.diff(keys) > 0.0).all():
@@ -95,14 +98,25 @@ class GltfMotion:
             raise misplaced(f"{place}.output", "quaternions other than zero", "zero")
         return keys, values, kind, place
 
-    def poses(self, number: int) -> Poses | None:
-        """Transforms from a node to its parent at all times; None if it does not move."""
-        channels = self._channels.get(number)
-        if channels is None or not len(self.times_s):
-            return None
+    def moves(self, number: int) -> bool:
+        """Whether the animation changes the transform of a node over time."""
+        return len(self.times_s) > 0 and not self._channels.get(number, {}).keys().isdisjoint(_REST)
+
+    def poses(self, number: int, times_s: NDArray[np.float64]) -> Poses:
+        """Transforms from a node to its parent at these times; those of the node itself where it is not animated."""
         node = self.data.at("nodes", number)
-        moved = {path: _sampled(path, channel, self.times_s) for path, channel in channels.items()}
-        return local_poses({name: value for name, value in node.items() if name != "matrix"} | moved, len(self.times_s))
+        moved = {
+            path: _sampled(path, channel, times_s)
+            for path, channel in self._channels.get(number, {}).items()
+            if path in _REST
+        }
+        own = {name: value for name, value in node.items() if not moved or name != "matrix"}
+        return local_poses(own | moved, len(times_s))
+
+    def weights(self, number: int, time_s: float) -> NDArray[np.float64] | None:
+        """Weights of the morph targets at a node at a time; None if they are not animated."""
+        channel = self._channels.get(number, {}).get("weights")
+        return None if channel is None else _sampled("weights", channel, np.array([time_s]))[0]
 
 
 def _sampled(path: str, channel: _Channel, times_s: NDArray) -> NDArray:

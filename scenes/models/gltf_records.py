@@ -109,18 +109,19 @@ class Records:
         accessor, node, camera = self.at("accessors"), self.at("nodes"), self.at("cameras")
         attributes = record(**dict.fromkeys(_ATTRIBUTES, accessor))
         primitive = record(
-            {"attributes": attributes}, indices=accessor, material=self.at("materials"), mode=whole(0, 6)
+            {"attributes": attributes}, indices=accessor, material=self.at("materials"), mode=whole(0, 6),
+            targets=items(attributes),
         )  # fmt: skip
         light = record({"light": whole()})
         channel = record({"sampler": whole(), "target": record(node=node, path=text)})
         return {
             "animations": record(channels=items(channel), samplers=items(record())),
             "cameras": _camera,
-            "meshes": record(name=text, primitives=items(primitive)),
+            "meshes": record(name=text, primitives=items(primitive), weights=items(number)),
             "nodes": record(
                 name=text, children=items(node), mesh=self.at("meshes"), skin=self.at("skins"), camera=camera,
                 matrix=numbers(16), translation=numbers(3), rotation=numbers(4), scale=numbers(3),
-                extensions=record(KHR_lights_punctual=light),
+                weights=items(number), extensions=record(KHR_lights_punctual=light),
             ),
             "scenes": record(nodes=items(node)),
             "skins": record({"joints": items(node)}, inverseBindMatrices=accessor),

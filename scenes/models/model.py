@@ -44,12 +44,14 @@ class Model:
         lights: lights without an area, and environments.
         cameras: cameras by name, in the order of the file.
         up: upward axis, where the file names it.
+        posed: whether parts of it change other than by rigid motion, and are as at the time for which it was read.
     """
 
     parts: tuple[Instance, ...]
     lights: tuple[Light, ...] = ()
     cameras: Mapping[str, ModelCamera] = field(default_factory=dict)
     up: Up | None = None
+    posed: bool = False
 
     @property
     def lit(self) -> bool:

@@ -8,7 +8,7 @@ from typing import Any
 
 from scenes.canonical import Instance, Scene, SceneError
 from scenes.formats.losses import LossReport
-from scenes.models import read_whole
+from scenes.models import MODEL_ENDINGS, read_whole
 from scenes.viewing import Up, framed
 
 _Y_UP = (".obj", ".gltf", ".glb")
@@ -20,9 +20,22 @@ def model_up(path: Path, facets: bool = False) -> Up:
     return read_whole(path, facets=facets).up or ("y" if path.suffix.lower() in _Y_UP else "z")
 
 
-def model_scene(path: Path, report: LossReport, up: Up | None = None, facets: bool = False, camera: str = "") -> Scene:
+def is_posed(scene: object) -> bool:
+    """Whether a scene is the file of a model whose parts are read at one time, since they do not move rigidly."""
+    path = Path(scene) if isinstance(scene, (str, Path)) else Path()
+    return path.suffix.lower() in MODEL_ENDINGS and read_whole(path).posed
+
+
+def model_scene(
+    path: Path,
+    report: LossReport,
+    up: Up | None = None,
+    facets: bool = False,
+    camera: str = "",
+    time_s: float = 0.0,
+) -> Scene:
     """A model with the lights and the first camera of its file; without such, with those of
-    :func:`scenes.viewing.framed`, which show all of it.
+    :func:`scenes.viewing.framed`, which show all of it as it is at its start.
 
     Args:
         path: see :func:`scenes.models.read_model`.
@@ -30,15 +43,16 @@ def model_scene(path: Path, report: LossReport, up: Up | None = None, facets: bo
         up: upward axis; by default :func:`model_up`.
         facets: see :func:`scenes.models.read_model`.
         camera: name of a camera of the file; the first one if empty.
+        time_s: see :func:`scenes.models.read_whole`.
 
     Raises:
         SceneError: the model cannot be read, or has no camera of this name.
     """
-    model = read_whole(path, report, facets)
+    model, first = read_whole(path, report, facets, time_s), read_whole(path, facets=facets)
     if camera and camera not in model.cameras:
         known = ", ".join(model.cameras) or "none"
         raise SceneError(f"camera: expected one of the cameras of {path} ({known}), got {camera!r}")
-    shown = tuple(part for part in model.parts if part.emission is None) or model.parts
+    shown = tuple(part for part in first.parts if part.emission is None) or first.parts
     scene = framed(shown, up or model_up(path, facets), path.stem)
     changed: dict[str, Any] = {}
     if model.lit:

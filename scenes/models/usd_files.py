@@ -1,4 +1,4 @@
-"""Reader of USD: the imageable prims of a stage at its start, with their rigid motion.
+"""Reader of USD: the imageable prims of a stage, with their rigid motion.
 
 Coordinates are those of the file, whatever ``metersPerUnit`` is: nothing in a picture depends on the unit.
 
@@ -20,6 +20,7 @@ from scenes.formats.losses import LossReport
 from scenes.loading import state_of
 from scenes.models.gltf_materials import GltfMaterials
 from scenes.models.model import Model, ModelCamera
+from scenes.models.motion import Pose
 from scenes.models.smoothing import unit_normals, with_corners
 from scenes.models.sources import Sources
 from scenes.models.usd_curves import curves_of
@@ -37,7 +38,7 @@ from scenes.models.usd_motion import UsdMotion
 from scenes.models.usd_shapes import KINDS as SHAPES
 from scenes.models.usd_shapes import shapes_of
 from scenes.models.usd_textures import Pictures, UsdDocument, UsdTextures
-from scenes.models.usd_values import finite, report_animated
+from scenes.models.usd_values import finite, note_animated
 from scenes.models.usd_views import LAMP, camera_of, glow_of, light_of
 
 _GREY = 0.18
@@ -54,10 +55,11 @@ _SAID_MOST = 200  # characters of a message, which may quote the rest of the fil
 _Part = tuple[Any, Material, Matrix]
 
 
-def read_usd(sources: Sources, report: LossReport, facets: bool = False) -> Model:
+def read_usd(sources: Sources, report: LossReport, facets: bool = False, time_s: float = 0.0) -> Model:
     """The stage of a file: its meshes, primitives and instances, lights and cameras.
 
-    Prims that are invisible, or proxies or guides, are left out. Meshes of a skeleton have its pose at the start.
+    Prims that are invisible, or proxies or guides, are left out. Skeletons, and all values that change over time
+    beside transforms, are as at ``time_s``, seconds since the start of the stage.
 
     Raises:
         SceneError: the file cannot be read.
@@ -72,7 +74,7 @@ def read_usd(sources: Sources, report: LossReport, facets: bool = False) -> Mode
                 sources.files.setdefault(path, state_of(path))
         for error in sorted(_ADDRESS.sub("", str(error)) for error in stage.GetCompositionErrors()):
             report.add(sources.path.stem, " ".join(error.split())[:_SAID_MOST])
-        return _Reader(stage, sources, report, facets).model()
+        return _Reader(stage, sources, report, facets, time_s).model()
     except Tf.ErrorException as error:
         said = _RULE.sub("", " ".join(str(error.args[0].commentary).split()))
         raise SceneError(f"cannot be read: {said.removeprefix(f'{sources.path}:')[:_SAID_MOST]}") from None
@@ -100,13 +102,13 @@ def _refuse_nested(sources: Sources) -> None:
 class _Reader:
     """Reads the prims of a stage, each mesh once."""
 
-    def __init__(self, stage: Any, sources: Sources, report: LossReport, facets: bool) -> None:
+    def __init__(self, stage: Any, sources: Sources, report: LossReport, facets: bool, time_s: float) -> None:
         self.stage, self.sources, self.report = stage, sources, report
-        self.motion = UsdMotion(stage)
-        self.code = self.motion.start
+        self.motion = UsdMotion(stage, Pose(time_s, report))
+        self.code = self.motion.code
         document = UsdDocument(sources)
         self.pictures = Pictures(sources)
-        self.described = UsdMaterials(document, self.pictures, self.code, report)
+        self.described = UsdMaterials(document, self.pictures, self.motion, report)
         self.materials = GltfMaterials(document, UsdTextures(document, report), report, facets)
         self.instances = PointInstances(stage, self.motion, report)
         self.up_is_z = UsdGeom.GetStageUpAxis(stage) == UsdGeom.Tokens.z
@@ -117,25 +119,28 @@ class _Reader:
 
     def model(self) -> Model:
         self._bend()
-        shown = list(prims_of(self.stage.GetPseudoRoot(), Usd.PrimDefaultPredicate, self.code, self.report))
-        tracks = self.motion.tracks(shown, self.report)
+        shown = list(prims_of(self.stage.GetPseudoRoot(), Usd.PrimDefaultPredicate, self.motion))
+        tracks = self.motion.tracks(shown)
         for prim in shown:
             self.instances.admit(prim)
             self._add(prim, self.motion.matrix(prim), tracks.get(self.motion.mover(prim)))
-        return Model(tuple(self._parts), tuple(self._lights), self._cameras, "z" if self.up_is_z else "y")
+        up = "z" if self.up_is_z else "y"
+        return Model(tuple(self._parts), tuple(self._lights), self._cameras, up, self.motion.pose.counts)
 
     def _bend(self) -> None:
-        """Moves points of skinned meshes to the pose of their skeletons at the start, in memory alone."""
+        """Moves points of skinned meshes to the pose of their skeletons, in memory alone."""
         roots = [prim for prim in self.stage.Traverse() if prim.IsA(UsdSkel.Root)]
         if not roots:
             return
         self.stage.SetEditTarget(self.stage.GetSessionLayer())
         at = self.code.GetValue()
         for root in roots:
-            animations = [UsdSkel.Animation(prim) for prim in Usd.PrimRange(root) if prim.IsA(UsdSkel.Animation)]
-            parts = [f"Get{part}Attr" for part in ("Translations", "Rotations", "Scales")]
-            if any(getattr(one, part)().ValueMightBeTimeVarying() for one in animations for part in parts):
-                self.report.add(root.GetName(), "a skeleton that moves", "the pose at its start")
+            animations = [prim for prim in Usd.PrimRange(root) if prim.IsA(UsdSkel.Animation)]
+            moving = [one for prim in animations for one in prim.GetAttributes() if one.ValueMightBeTimeVarying()]
+            if moving:
+                self.motion.pose.add(root.GetName(), "a skeleton that moves")
+            for attribute in moving:  # baking takes samples as they are, and does not interpolate
+                attribute.Set(attribute.Get(self.code), self.code)
             UsdSkel.BakeSkinning(UsdSkel.Root(root), Gf.Interval(at, at))
 
     def _add(self, prim: Any, matrix: Matrix, track: RigidTrack | None) -> None:
@@ -145,7 +150,7 @@ class _Reader:
             self._instances(prim, matrix, track)
         elif prim.IsA(UsdGeom.Camera):
             key = prim.GetName() if prim.GetName() not in self._cameras else str(prim.GetPath())
-            report_animated(prim, self.report)
+            note_animated(prim, self.motion.pose)
             self._cameras[key] = camera_of(prim, self.code, matrix, track, self.report)
         elif prim.HasAPI(UsdLux.LightAPI) and not prim.IsA(UsdGeom.Gprim):
             self._light(prim, matrix, track, name)
@@ -162,12 +167,12 @@ class _Reader:
         if abs(np.linalg.det(matrix[:3, :3])) == 0.0:
             self.report.add(prim.GetName(), "a light without extent")
             return
-        report_animated(prim, self.report)
+        note_animated(prim, self.motion.pose)
         light, lamp = light_of(prim, self.code, matrix, self.pictures, self.up_is_z, self.report)
         if light is not None:
             self._lights.append(light)
             if track is not None:
-                self.report.add(prim.GetName(), "a moving light", "the pose at its start")
+                self.motion.pose.add(prim.GetName(), "a moving light")
         elif lamp is not None:
             shape, place, radiance = lamp
             self._parts.append(Instance(shape, LAMP, place, track, name, radiance))
@@ -226,7 +231,7 @@ class _Reader:
     def _mesh(self, mesh: Any, name: str) -> list[_Part]:
         """The parts of a mesh, one for each material."""
         if mesh.GetPointsAttr().GetNumTimeSamples() > 1:
-            self.report.add(name, "vertices that move", "their places at the start")
+            self.motion.pose.add(name, "vertices that move", "their places")
         whole = triangles_of(mesh, self.code, name, self.report)
         if whole is None:
             return []

@@ -22,7 +22,7 @@ _AMONG = Usd.PrimIsActive & Usd.PrimIsLoaded  # prototypes may lie below a class
 Inner = list[tuple[Any, Matrix]]
 
 
-def prims_of(root: Any, among: Any, code: Any, report: LossReport) -> Iterator[Any]:
+def prims_of(root: Any, among: Any, motion: UsdMotion) -> Iterator[Any]:
     """Visible prims at and below a root that hold something, within instances too; those below a point instancer
     are its prototypes."""
     walk = iter(Usd.PrimRange(root, Usd.TraverseInstanceProxies(among)))
@@ -34,8 +34,8 @@ def prims_of(root: Any, among: Any, code: Any, report: LossReport) -> Iterator[A
             continue
         visible = imageable.GetVisibilityAttr()
         if visible.ValueMightBeTimeVarying():
-            report.add(prim.GetName(), "an animation of the visibility", "that at its start")
-        if visible.Get(code) == UsdGeom.Tokens.invisible:
+            motion.pose.add(prim.GetName(), "an animation of the visibility", "that")
+        if visible.Get(motion.code) == UsdGeom.Tokens.invisible:
             walk.PruneChildren()
             continue
         if imageable.ComputePurpose() in (UsdGeom.Tokens.proxy, UsdGeom.Tokens.guide):
@@ -96,10 +96,10 @@ class PointInstances:
         return self._found[key]
 
     def _read(self, given: Any, prim: Any) -> list[tuple[Matrix, Inner]]:
-        name, code, made = prim.GetName(), self.motion.start, []
+        name, code, made = prim.GetName(), self.motion.code, []
         placing = "Positions", "Orientations", "Scales", "ProtoIndices", "InvisibleIds"
         if any(getattr(given, f"Get{one}Attr")().ValueMightBeTimeVarying() for one in placing):
-            self.report.add(name, "instances that move", "their poses at the start")
+            self.motion.pose.add(name, "instances that move", "their poses")
         colors = UsdGeom.PrimvarsAPI(prim).GetPrimvar("displayColor")
         if colors and colors.HasValue() and colors.GetInterpolation() != UsdGeom.Tokens.constant:
             self.report.add(name, "colours of single instances")
@@ -118,9 +118,9 @@ class PointInstances:
             if not root:
                 self.report.add(name, f"a prototype {path}, which is not there")
                 continue
-            inner = [(one, self.motion.matrix_below(one, root)) for one in prims_of(root, _AMONG, code, self.report)]
+            inner = [(one, self.motion.matrix_below(one, root)) for one in prims_of(root, _AMONG, self.motion)]
             if any(self.motion.mover(one).startswith(str(root.GetPath())) for one, _ in inner):
-                self.report.add(name, f"motion within the prototype {root.GetName()}", "its pose at the start")
+                self.motion.pose.add(name, f"motion within the prototype {root.GetName()}")
             at = np.flatnonzero(chosen == number)
             made += [(poses[one].T, inner) for one in (at[np.array(mask, bool)[at]] if len(mask) else at)]
         return made

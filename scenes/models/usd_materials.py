@@ -13,8 +13,9 @@ import numpy as np
 from scenes.formats.losses import LossReport
 from scenes.models.gltf_textures import multiplied
 from scenes.models.usd_library import Sdf, UsdShade
+from scenes.models.usd_motion import UsdMotion
 from scenes.models.usd_textures import WRAPS, Make, Pictures, Reading, UsdDocument
-from scenes.models.usd_values import finite, report_animated
+from scenes.models.usd_values import finite, note_animated
 from scenes.pictures import Pixels
 
 _NUMBERS = {"metallic": 0.0, "roughness": 0.5, "opacity": 1.0, "opacityThreshold": 0.0, "ior": 1.5, "clearcoat": 0.0,
@@ -34,8 +35,9 @@ class UsdMaterials:
         document: materials in the terms of glTF.
     """
 
-    def __init__(self, document: UsdDocument, pictures: Pictures, code: Any, report: LossReport) -> None:
-        self.document, self.pictures, self.code, self.report = document, pictures, code, report
+    def __init__(self, document: UsdDocument, pictures: Pictures, motion: UsdMotion, report: LossReport) -> None:
+        self.document, self.pictures, self.report = document, pictures, report
+        self.code, self.pose = motion.code, motion.pose
         self._names: list[str] = []
         self._numbers: dict[str, tuple[int, str]] = {}
         self._wraps: dict[Reading, tuple[int, int]] = {}
@@ -82,7 +84,7 @@ class UsdMaterials:
         if kind != "UsdPreviewSurface":
             self.report.add(where, f"a surface of kind {kind or 'none'}", "the displayed colour")
             return None
-        report_animated(shader.GetPrim(), self.report)
+        note_animated(shader.GetPrim(), self.pose)
         given = {name: self._value(shader, name, rest, where) for name, rest in {**_NUMBERS, **_COLORS}.items()}
         for name, value in given.items():
             if isinstance(value, Reading) and name not in _TEXTURED:

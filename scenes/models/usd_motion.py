@@ -8,8 +8,7 @@ import numpy as np
 
 from scenes.arithmetic import inverse, product
 from scenes.canonical import Matrix, RigidTrack, SceneError
-from scenes.formats.losses import LossReport
-from scenes.models.motion import rigid_track, uniform_times
+from scenes.models.motion import Pose, rigid_track, uniform_times
 from scenes.models.usd_library import Usd, UsdGeom
 
 
@@ -18,9 +17,11 @@ class UsdMotion:
 
     Attributes:
         start: time code of the start: that of the stage, or the first time sample of a transform.
+        pose: time at which everything is read that does not move rigidly.
+        code: its time code.
     """
 
-    def __init__(self, stage: Any) -> None:
+    def __init__(self, stage: Any, pose: Pose) -> None:
         self._rate = float(stage.GetTimeCodesPerSecond()) or 24.0
         moving = [prim for prim in stage.Traverse(Usd.TraverseInstanceProxies()) if prim.IsA(UsdGeom.Xformable)]
         samples = [code for prim in moving for code in UsdGeom.Xformable(prim).GetTimeSamples()]
@@ -29,21 +30,24 @@ class UsdMotion:
         last = stage.GetEndTimeCode() if given else max(samples, default=first)
         self.start = Usd.TimeCode(first)
         self._last_s = (last - first) / self._rate if samples else 0.0
-        self._cache = UsdGeom.XformCache(self.start)
+        self.pose, self.code = pose, Usd.TimeCode(first + pose.time_s * self._rate)
+        self._first, self._now = UsdGeom.XformCache(self.start), UsdGeom.XformCache(self.code)
         self._movers: dict[str, str] = {"/": ""}
+        self._tracks: dict[str, RigidTrack] = {}
 
     def matrix(self, prim: Any) -> Matrix:
-        """The transform from a prim to the world at the start.
+        """The transform from a prim to the world: at the start for those of :meth:`tracks`, else at the pose.
 
         Raises:
             SceneError: it is not finite.
         """
-        return _finite(self._cache.GetLocalToWorldTransform(prim), prim)
+        cache = self._first if self.mover(prim) in self._tracks else self._now
+        return _finite(cache.GetLocalToWorldTransform(prim), prim)
 
     def matrix_below(self, prim: Any, root: Any) -> Matrix:
         """The transform from a prim of a prototype to the space of its instances, with that of its root."""
-        above = self._cache.GetParentToWorldTransform(root)
-        return product(inverse(_finite(above, root)), self.matrix(prim))
+        above = self._now.GetParentToWorldTransform(root)
+        return product(inverse(_finite(above, root)), _finite(self._now.GetLocalToWorldTransform(prim), prim))
 
     def mover(self, prim: Any) -> str:
         """The path of the nearest prim at or above a prim that moves; empty if there is none."""
@@ -58,8 +62,8 @@ class UsdMotion:
                 self._movers[path] = self.mover(prim.GetParent())
         return self._movers[path]
 
-    def tracks(self, prims: list[Any], report: LossReport) -> dict[str, RigidTrack]:
-        """The rigid motion of all prims that move, by their paths; motion that is not rigid is reported.
+    def tracks(self, prims: list[Any]) -> dict[str, RigidTrack]:
+        """The rigid motion of all prims that move, by their paths; motion that is not rigid is noted.
 
         Raises:
             SceneError: the animation is too long.
@@ -77,10 +81,11 @@ class UsdMotion:
             for number, prim in enumerate(moving):
                 world[number, key] = _finite(cache.GetLocalToWorldTransform(prim), prim)
         found = {
-            path: rigid_track(poses, times_s, prim.GetName(), report)
+            path: rigid_track(poses, times_s, prim.GetName(), self.pose)
             for path, poses, prim in zip(paths, world, moving, strict=True)
         }
-        return {path: track for path, track in found.items() if track is not None}
+        self._tracks = {path: track for path, track in found.items() if track is not None}
+        return self._tracks
 
 
 def _finite(matrix: Any, prim: Any) -> Matrix:

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scenes.canonical import SceneError
-from scenes.formats.losses import LossReport
+from scenes.models.motion import Pose
 
 
 def finite(value: Any, where: object) -> Any:
@@ -36,9 +36,9 @@ def array_of(values: Any, width: int) -> NDArray[np.float64]:
     return found.reshape(-1, width) if width else found.reshape(-1)
 
 
-def report_animated(prim: Any, report: LossReport) -> None:
-    """Reports values of a prim that change over time, beside its transform and visibility, which are read otherwise."""
+def note_animated(prim: Any, pose: Pose) -> None:
+    """Notes values of a prim that change over time, beside its transform and visibility, which are read otherwise."""
     names = (one.GetName() for one in prim.GetAttributes() if one.ValueMightBeTimeVarying())
     changing = sorted(name for name in names if not name.startswith("xformOp") and name != "visibility")
     if changing:
-        report.add(prim.GetName(), f"values that change ({', '.join(changing)})", "those at the start")
+        pose.add(prim.GetName(), f"values that change ({', '.join(changing)})", "those")

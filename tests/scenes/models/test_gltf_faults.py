@@ -76,8 +76,10 @@ def whole_file(folder: Path) -> Gltf:
         "extensions": {"KHR_lights_punctual": {"lights": lights}}, "extensionsUsed": ["KHR_lights_punctual"],
         "extensionsRequired": ["KHR_lights_punctual"],
     }  # fmt: skip
+    file.primitive["targets"] = [{"POSITION": 0}]
+    file.json["meshes"][0]["weights"] = [0.5]
     file.json["nodes"] += [
-        {"mesh": 0, "camera": 0, "rotation": [0, 0, 0, 1], "scale": [1, 1, 1], "children": [4]},
+        {"mesh": 0, "camera": 0, "weights": [0.2], "rotation": [0, 0, 0, 1], "scale": [1, 1, 1], "children": [4]},
         {"camera": 1, "matrix": np.eye(4).ravel().tolist(), "extensions": {"KHR_lights_punctual": {"light": 0}}},
     ]
     file.json["scenes"][0]["nodes"] += [3]

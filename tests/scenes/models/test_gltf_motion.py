@@ -74,11 +74,11 @@ def test_a_cubic_spline_follows_its_tangents(tmp_path: Path) -> None:
 
 def test_growth_is_reported_and_leaves_the_pose_at_its_start(tmp_path: Path) -> None:
     report, scales = LossReport(), [[1, 1, 1], [2, 2, 2]]
-    file = animated(tmp_path, (0, "scale", [0.0, 1.0], scales, "LINEAR"), (0, "weights", [0.0], [[1]], "LINEAR"))
+    file = animated(tmp_path, (0, "scale", [0.0, 1.0], scales, "LINEAR"), (0, "pointer", [0.0], [[1, 1, 1]], "LINEAR"))
     (part,) = read_model(file.written(), report)
     assert part.track is None and where(part, (1.0, 0.0, 0.0), 0.0) == pytest.approx((2.0, 1.0, 0.0))
     said = " ".join(map(str, report.losses))
-    assert "an animation that scales or shears" in said and "an animation of weights" in said
+    assert "an animation that scales or shears" in said and "an animation of pointer" in said
 
 
 def test_channels_that_cannot_be(tmp_path: Path) -> None:

@@ -1,0 +1,55 @@
+"""The renderer of each time of a sequence, for models whose parts do not move rigidly."""
+
+from __future__ import annotations
+
+import dataclasses
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from analysis.tracer.render_options import RenderOptions
+from renderer.trace import Renderer
+from scenes import catalog
+from scenes.canonical import Scene
+from scenes.models import files_of
+from scenes.models.scenes_of_models import is_posed
+
+ANEW = "what does not move rigidly is read anew for each frame, and stands still while the shutter is open"
+
+
+class Posing:
+    """Renderers of a scene: one for all times, or one for each where a model is posed.
+
+    Attributes:
+        anew: whether the scene is read for each time.
+    """
+
+    def __init__(self, options: RenderOptions, scene: Scene) -> None:
+        """Builds the renderer of the first time.
+
+        Args:
+            options: of the command.
+            scene: scene as at the first time.
+        """
+        self._options, self._scene = options, scene
+        self.anew = is_posed(options.scene)
+        self._time_s, self._renderer = options.time_s, self._of(scene)
+
+    def at(self, time_s: float) -> Renderer:
+        """The renderer of a time in seconds; the last one is kept."""
+        if self.anew and time_s != self._time_s:
+            look = dataclasses.replace(self._options.look, pose_s=time_s)
+            scene, _ = catalog.load_seen(self._options.scene, look, self._options.phase)
+            self._time_s, self._renderer = time_s, self._of(scene)
+        return self._renderer
+
+    def _of(self, scene: Scene) -> Renderer:
+        return Renderer(scene, self._options.device, self._options.threads or None, seed=self._options.seed)
+
+    @property
+    def content(self) -> Any:
+        """Everything in the input that decides the pictures: the scene, and the files of a model that is posed."""
+        if not self.anew:
+            return self._scene
+        return self._scene, [np.fromfile(path, np.uint8) for path in files_of(Path(self._options.scene))]
