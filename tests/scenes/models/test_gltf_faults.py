@@ -265,5 +265,5 @@ def test_whole_numbers_may_have_a_point_and_names_may_be_null(tmp_path: Path) ->
     file.json = pointed(file.json)
     for node in file.json["nodes"]:
         node.setdefault("name", None)
-    file.json["meshes"][0] |= {"name": None, "weights": None}
+    file.json["meshes"][0] |= {"name": None, "extras": None}
     assert difference(before, load_scene_file(file.written())) is None

@@ -1,0 +1,60 @@
+"""Films of models that do not move rigidly: each frame is that of its own time."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import OpenEXR
+import pytest
+
+from tests.scenes.models.test_poses import channel, with_morphs
+from tests.scripts.commands import call_script
+
+SIZE = "--size", "48x32", "--samples-per-axis", "1"
+
+
+def raised(folder: Path, height: float = 2.0) -> str:
+    file = with_morphs(folder)
+    channel(file, 0, "weights", [0.0, 1.0], np.array([0.0, 0.0, height, 0.0]))
+    return str(file.written())
+
+
+def content(folder: Path) -> list[bytes]:
+    return [path.read_bytes() for path in sorted(folder.glob("frame*"))]
+
+
+def depth(path: Path) -> np.ndarray:
+    with OpenEXR.File(str(path), separate_channels=True) as file:
+        return file.channels()["Z"].pixels
+
+
+def test_frames_of_a_film_are_the_stills_of_their_times(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture, tmp_path: Path
+) -> None:
+    model, film, still = raised(tmp_path), tmp_path / "film", tmp_path / "still"
+
+    def run(out: Path, *more: str) -> tuple[list[bytes], str]:
+        assert call_script("render.py", monkeypatch, model, *SIZE, *more, "--out", str(out)) == 0
+        return content(out), capsys.readouterr().out
+
+    frames, said = run(film, "--frames", "3", "--fps", "2")
+    assert len(set(frames)) == 3 and "read anew for each frame" in said
+    for number, frame in enumerate(frames):
+        (alone,), said = run(still, "--time-s", str(number / 2))
+        assert alone == frame and f"the pose at {number / 2:g} s" in said and "anew" not in said
+    # a key after the first frame changes: the frames that depend on it are rendered again
+    raised(tmp_path, 1.0)
+    again, said = run(film, "--frames", "3", "--fps", "2")
+    assert "3 rendered now" in said and again[0] == frames[0] and again[1] != frames[1]
+
+
+def test_layers_are_those_of_the_pose(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture, tmp_path: Path
+) -> None:
+    view = "--camera", "0", "0", "9", "0", "0", "0", "--samples", "16", "--layers", "--format", "exr"
+    model = raised(tmp_path)
+    options = *view, *SIZE[:2], "--frames", "2", "--fps", "1", "--out", str(tmp_path / "out")
+    assert call_script("render.py", monkeypatch, model, *options) == 0
+    depths = [depth(path)[16, 24] for path in sorted((tmp_path / "out").glob("frame*"))]
+    np.testing.assert_allclose(depths, [9.0, 7.0], atol=0.05)
