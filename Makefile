@@ -84,9 +84,12 @@ bench-history: $(HISTORY)
 docs: $(DOCS)
 	NO_MKDOCS_2_WARNING=1 $(PY) -m mkdocs build --strict --quiet
 
-# records the installed versions
-constraints: $(STAMP) $(DOCS) $(MUTANTS) $(HISTORY)
-	$(PY) -m pip freeze --all --exclude-editable | grep -v ^pip== | sed 's/+cpu$$//' > constraints.txt
+# records the installed versions of all extras, which it installs first: what is missing would lose its line
+constraints: $(BASE)
+	$(INSTALL) '.[test,docs,mutants,history]'
+	$(PY) -m pip list --format=freeze --exclude-editable > $(VENV)/.frozen
+	grep -v ^pip== $(VENV)/.frozen | sed 's/+cpu$$//' > $(VENV)/.constraints
+	mv $(VENV)/.constraints constraints.txt
 
 clean:
 	rm -rf out .cache site

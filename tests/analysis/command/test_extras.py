@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import subprocess
 import sys
 import tomllib
@@ -101,6 +102,18 @@ def test_constraints_have_one_version_in_the_range_of_every_requirement() -> Non
         version = pinned[canonicalize_name(one.name)]
         assert one.specifier.contains(version, prereleases=True), f"{one}: constraints.txt has {version}"
     assert pinned["torch"] == "2.13.0" and pinned["torchvision"] == "0.28.0"
+
+
+def test_constraints_are_recorded_with_all_extras_installed(tmp_path: Path) -> None:
+    """In an environment that lacks some of them, their lines would be lost; a recording that fails changes nothing."""
+    asked = ["make", "--dry-run", "constraints", f"VENV={tmp_path}", "PYTHON=python3"]
+    done = subprocess.run(asked, cwd=ROOT, capture_output=True, text=True, check=True)
+    lines = [line for line in done.stdout.splitlines() if "constraints.txt" in line or "pip list" in line]
+    installed = set(re.search(r"\.\[([\w,]+)\]", lines[-3])[1].split(","))
+    for extra in tuple(installed):
+        installed |= {one for found in OPTIONAL[extra] if found.name == DISTRIBUTION for one in found.extras}
+    assert installed == set(OPTIONAL)
+    assert "pip list" in lines[-2] and re.fullmatch(r"mv \S+ constraints\.txt", lines[-1])
 
 
 def test_an_installed_copy_has_every_file_of_the_packages(tmp_path: Path) -> None:
