@@ -37,7 +37,7 @@ def viewpoint_of(buffers: SceneBuffers, view: ViewData, time_s: float) -> Viewpo
     to_camera = inverse(from_camera)
     return Viewpoint(
         time_s,
-        torch.from_numpy(buffers.data.instances.numpy()["track"].astype(np.int64)),
+        buffers.track_of_instance,
         torch.from_numpy(rotation),
         torch.from_numpy(translation),
         torch.from_numpy(to_camera),

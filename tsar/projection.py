@@ -59,14 +59,5 @@ def project(
 
 
 def to_camera(view: Viewpoint) -> tuple[Float64[Tensor, "rows 3 3"], Float64[Tensor, "rows 3"]]:
-    """Matrix and offset from each instance's track to the camera; the last row is for directions in the world (hits at
-    infinity)."""
-    # by rows and columns: the bits of a matrix product may depend on the library
-    camera = view.to_camera
-    rotation = sum(camera[:, k, None] * view.rotation[:, k, None, :] for k in range(3))
-    offset = sum(camera[:, k] * view.translation[:, k, None] for k in range(3)) + view.to_camera_offset
-    of = view.track_of_instance
-    return (
-        torch.cat([rotation[of], camera[None]]),  # type: ignore[index]
-        torch.cat([offset[of], torch.zeros(1, 3, dtype=torch.float64)]),
-    )
+    """Matrices and offsets of the rows of a view."""
+    return view.rows[:, :9].unflatten(1, (3, 3)), view.rows[:, 9:]

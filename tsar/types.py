@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import Literal
 
 import torch
@@ -116,6 +117,18 @@ class Viewpoint:
     kind: Literal["perspective", "parallel", "panorama"]
     tan_x: float
     tan_y: float
+
+    @cached_property
+    def rows(self) -> Float64[Tensor, "rows 12"]:
+        """Matrix, row by row, and offset from each instance's track to the camera; the last row is for directions in
+        the world (hits at infinity)."""
+        # by rows and columns: the bits of a matrix product may depend on the library
+        camera, columns = self.to_camera, range(3)
+        rotation = sum(camera[:, k, None] * self.rotation[:, k, None, :] for k in columns)
+        offset = sum(camera[:, k] * self.translation[:, k, None] for k in columns) + self.to_camera_offset
+        tracks = torch.cat([rotation.flatten(1), offset], dim=1)  # type: ignore[union-attr]
+        away = torch.cat([camera.flatten(), torch.zeros(3, dtype=torch.float64)])
+        return torch.cat([tracks[self.track_of_instance], away[None]])
 
 
 @dataclass(frozen=True)

@@ -15,7 +15,7 @@ from renderer.compute.team import TEAM, shares
 from renderer.stages import filtering_kernels as kernels
 from renderer.stages import picture_kernels
 from renderer.stages.noise import Detailed
-from renderer.stages.poses import pose_words, rows_of
+from renderer.stages.poses import pose_words
 from renderer.stages.sizes import FRAME, LEVEL_PLANES, PIXEL_WORDS
 from tsar.filtering.batches import Traced
 from tsar.filtering.options import FilterOptions
@@ -89,7 +89,7 @@ class _Compiled:
         self, estimates: Estimates, surfels: Surfels, rate: Tensor, seconds: float, view: Viewpoint
     ) -> tuple[Estimates, Surfels]:
         """Like :func:`tsar.filtering.motion.advanced`."""
-        rows, rate = rows_of(view), rate.contiguous()
+        rate = rate.contiguous()
         before = _planes(estimates, surfels)
         after = self._new_planes()
         where = [self._address(name, plane) for name, plane in zip(_KINDS, before, strict=True)]
@@ -97,7 +97,7 @@ class _Compiled:
             *where[:-1], *(self._address(name, plane) for name, plane in zip(_KINDS, after, strict=True))
         ]  # fmt: skip
         at = dict(zip(_KINDS, where, strict=True))
-        of = *pose_words(rows, view), *(at[name] for name in ("instance", "point", "inverse", "roughness"))
+        of = *pose_words(view), *(at[name] for name in ("instance", "point", "inverse", "roughness"))
         ageing = at["position"], at["aged"], self._elements(rate), seconds
         perspective = view.kind == "perspective"
         offer, choose = self._offer[perspective], self._choose[perspective]
@@ -134,12 +134,10 @@ class _Compiled:
         where = [address("batch", plane, kind, size) for plane, (_, kind, size) in zip(kept, batch, strict=True)]
         where += [0] * (6 - len(where))
         own = [self._address(name, plane) for name, plane in zip(_KINDS, planes, strict=True)]
-        views = [seen if moves else None for seen in (view, traced.earlier)]
-        rows = [rows_of(seen) if seen is not None else None for seen in views]
-        poses = [pose_words(row, seen) for row, seen in zip(rows, views, strict=True)]
+        now, was = (pose_words(seen if moves else None) for seen in (view, traced.earlier))
         moment = traced.now_s, options.memory_s, VARIANCE_MAX / traced.cycle_s
         flags = moves, options.accumulation, options.spread
-        self._batch.set(*where, tiles, *own, *changes, *self._samples, *poses[0], *poses[1], *moment, *map(int, flags))
+        self._batch.set(*where, tiles, *own, *changes, *self._samples, *now, *was, *moment, *map(int, flags))
         perspective = view is None or view.kind == "perspective"
         locate = self._locate[perspective]
         for command, (first, last) in zip(locate, shares(tiles, len(locate)), strict=False):
@@ -188,8 +186,7 @@ class _Compiled:
         ]  # fmt: skip
         kept = [values.contiguous() for values, _, _ in planes]
         where = [address("batch", plane, kind, size) for plane, (_, kind, size) in zip(kept, planes, strict=True)]
-        track, rows = view.track_of_instance.contiguous(), [rows_of(seen) for seen in (view, earlier)]
-        now, was = (pose_words(row, seen) for row, seen in zip(rows, (view, earlier), strict=True))
+        track, now, was = view.track_of_instance.contiguous(), pose_words(view), pose_words(earlier)
         self._shadows.set(
             self._elements(before), self._elements(after), self._side // ELEMENT_PX, *where, samples,
             address("tracks", track, _I64, len(track)), *now, *was, earlier.kind == "perspective", cycle_s,

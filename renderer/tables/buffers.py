@@ -3,9 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
+import torch
 import warp as wp
+from jaxtyping import Int64
+from torch import Tensor
 
 from renderer.layout.kinds import Shape
 from renderer.layout.scattering import ScatterRecord
@@ -65,6 +69,11 @@ class SceneBuffers:
     tracks: TrackTable
     keep: list[object]
     triangle_count: int
+
+    @cached_property
+    def track_of_instance(self) -> Int64[Tensor, " instances"]:
+        """Number of each instance's rigid motion."""
+        return torch.from_numpy(self.data.instances.numpy()["track"].astype(np.int64))
 
 
 def _upload(rows: list[dict], record: type, device: str) -> wp.array:
