@@ -11,11 +11,10 @@ import logging
 import signal
 import socket
 import sys
-import time
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from multiprocessing import resource_tracker
-from typing import TYPE_CHECKING, Any, Literal, TypeVar
+from typing import TYPE_CHECKING, Literal
 
 from analysis.command import limits
 from analysis.command.cli import InputError
@@ -25,9 +24,8 @@ from tsar.config import closed_choices, require
 from tsar.memory import core_count
 
 if TYPE_CHECKING:
-    from distributed import Client, Future, LocalCluster
+    from distributed import Client, LocalCluster
 
-Case = TypeVar("Case")
 WAIT_S = 30
 """Seconds to wait for an answer of a busy scheduler, or of a worker."""
 CONNECT_S = 3
@@ -63,7 +61,7 @@ class ClusterOptions:
 
     def __post_init__(self) -> None:
         limits.within(self, workers=limits.WORKERS, workers_least=(0, self.processes), memory_limit_gib=(0.0, 1e5))
-        limits.within(self, retries=(0, 100), worker_wait_s=(1.0, 1e6))
+        limits.within(self, retries=(0, 100), worker_wait_s=limits.WORKER_WAITS_S)
         alone = "none together with a scheduler, whose own cluster sets it"
         for name in ("workers_least", "memory_limit_gib") if self.scheduler else ():
             require(not getattr(self, name), name, alone, getattr(self, name))
@@ -115,8 +113,9 @@ def connected(options: ClusterOptions, say: Callable[[str], None] = lambda line:
         except (OSError, ValueError, TimeoutError) as error:
             reason = str(error) or f"it accepts connections, but sends no greeting within {WAIT_S} s"
             raise _silent(options.scheduler, reason) from error
+        logging.getLogger("distributed.client").addFilter(_NO_TRACEBACKS)
         with client:
-            say(dashboard_of(client))
+            say(dashboard_of(client, elsewhere=True))
             yield client
         return
     with contextlib.ExitStack() as held:
@@ -134,7 +133,7 @@ def connected(options: ClusterOptions, say: Callable[[str], None] = lambda line:
         if options.workers_least:
             cluster.adapt(minimum=options.workers_least, maximum=options.processes)
         client = held.enter_context(Client(cluster))
-        say(dashboard_of(client))
+        say(dashboard_of(client, elsewhere=False))
         try:
             yield client
         except KeyboardInterrupt:
@@ -143,61 +142,44 @@ def connected(options: ClusterOptions, say: Callable[[str], None] = lambda line:
             raise
 
 
-def ended(
-    client: Client, waiting: Mapping[Future, Case], wait_s: float = WAIT_S
-) -> Iterator[tuple[Case, Future, str | None]]:
-    """Cases as their futures end, each with the reason for its failure, or None.
+def dashboard_of(client: Client, elsewhere: bool) -> str:
+    """One line: the address of the dashboard, or why there is none.
 
-    If the scheduler is gone, or has had no worker for ``wait_s`` seconds, all remaining cases fail.
+    Args:
+        client: a client of the scheduler.
+        elsewhere: whether the scheduler is not of this process, so that its packages and its network are others.
     """
-    from distributed import wait
-
-    pending, seen_s = set(waiting), time.monotonic()
-    while pending:
-        try:
-            outcome: Any = wait(pending, timeout=1.0, return_when="FIRST_COMPLETED")
-            done, pending = outcome
-        except TimeoutError:
-            done = set[Any]()
-        except Exception as error:  # the connection may raise errors of several libraries
-            yield from ((waiting[future], future, f"the scheduler is gone ({_reason(error)})") for future in pending)
-            return
-        for future in done:
-            yield waiting[future], future, _failure(future)
-        if done or _has_workers(client):
-            seen_s = time.monotonic()
-        elif time.monotonic() - seen_s > wait_s:
-            yield from ((waiting[future], future, f"no worker was there for {wait_s:g} s") for future in pending)
-            return
-
-
-def _failure(future: Future) -> str | None:
-    """The reason why a case has no result, or None if it has one."""
-    if future.status == "finished":
-        return None
-    if future.status == "error":
-        error: Any = future.exception()
-        return _reason(error)
-    return "the scheduler or its workers were ended"
-
-
-def _has_workers(client: Client) -> bool:
+    has_bokeh = client.run_on_scheduler(_has_bokeh) if elsewhere else has_module("bokeh")
+    if not has_bokeh:
+        where = " on the scheduler's machine" if elsewhere else ""
+        return f"dashboard of Dask: none, because the package bokeh is not installed{where}; {installed_by('study')}"
+    link, port = client.dashboard_link, client.scheduler_info()["services"].get("dashboard")
+    if elsewhere and not port:
+        return "dashboard of Dask: none, because the scheduler was started without it"
     try:
-        return bool(client.scheduler_info(n_workers=1)["workers"])
-    except Exception:  # the connection may raise errors of several libraries
-        return False
+        if elsewhere:
+            _require_port(link.removesuffix("/status").replace("http", "tcp", 1))
+    except OSError:
+        place = f"{LOOPBACK}:{port}"
+        return f"dashboard of Dask: {place} on the scheduler's machine alone; ssh -L {port}:{place} forwards it"
+    return f"dashboard of Dask: {link}"
 
 
-def _reason(error: BaseException | None) -> str:
-    text = " ".join(str(error).split())
-    return f"{type(error).__name__}: {text[:300]}"
+def _has_bokeh() -> bool:
+    """Runs on the scheduler."""
+    from importlib.util import find_spec
+
+    return find_spec("bokeh") is not None
 
 
-def dashboard_of(client: Client) -> str:
-    """One line: the address of the dashboard, or why there is none."""
-    if not has_module("bokeh"):
-        return f"dashboard of Dask: none, because the package bokeh is not installed; {installed_by('study')}"
-    return f"dashboard of Dask: {client.dashboard_link}"
+class _NoTracebacks(logging.Filter):
+    """Drops what the client of a scheduler that went away logs: tracebacks of its tries to connect again."""
+
+    def filter(self, record: logging.LogRecord) -> bool:
+        return record.exc_info is None
+
+
+_NO_TRACEBACKS = _NoTracebacks()
 
 
 def _require_port(address: str) -> None:

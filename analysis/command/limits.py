@@ -9,6 +9,7 @@ from tsar.config import require
 SEEDS = (0, 2**32 - 1)
 THREADS = (0, 1024)
 WORKERS = (0, 256)
+WORKER_WAITS_S = (1.0, 1e6)
 SIDES_PX = (1, 32768)
 TIMES_S = (-1e9, 1e9)
 """Animation times, seconds; float64 resolves 1.2e-7 s there."""

@@ -23,6 +23,13 @@ Scheduler = Annotated[
     ),
 ]
 
+WorkerWait = Annotated[
+    float,
+    tyro.conf.arg(
+        help="Seconds without any worker after which the command ends; workers may wait long in a queue of jobs."
+    ),
+]
+
 Device = Annotated[Literal["cpu", "cuda:0"], tyro.conf.arg(help="Where rays are traced.")]
 
 References = Annotated[Path, tyro.conf.arg(help="Folder for references, shared by all runs.")]

@@ -9,7 +9,8 @@ from typing import Annotated, Literal
 import tyro
 
 from analysis.command import limits
-from analysis.command.options import REFERENCES, References, Scheduler, Threads
+from analysis.command.cluster import WAIT_S
+from analysis.command.options import REFERENCES, References, Scheduler, Threads, WorkerWait
 from analysis.metrics.display_model import DisplayModel
 from analysis.study.asked import require_distinct, require_inputs
 from analysis.study.inputs import INPUTS
@@ -44,6 +45,7 @@ class StimuliOptions:
     """Seed of all random numbers; of point sets and shifts."""
     threads: Threads = 0
     scheduler: Scheduler = ""
+    worker_wait_s: WorkerWait = WAIT_S
     out: Path = Path("out/perception")
     """Folder for the results; the stimuli, manifest.json and summary.json."""
 
@@ -56,6 +58,7 @@ class StimuliOptions:
             box_share=(1e-6, 1.0),
             seed=limits.SEEDS,
             threads=limits.THREADS,
+            worker_wait_s=limits.WORKER_WAITS_S,
         )
         require(len(self.jobs) >= 1, "jobs", "at least one", self.jobs)
 

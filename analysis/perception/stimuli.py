@@ -53,6 +53,7 @@ def render_stimuli(options: StimuliOptions, bars: Bars) -> dict[str, Any]:
             box_share=options.box_share,
             threads=options.threads,
             scheduler=options.scheduler,
+            worker_wait_s=options.worker_wait_s,
         )
         work = prepare(job)
         scene = work.settings.name

@@ -20,6 +20,7 @@ import pandas as pd
 import torch
 from PIL import Image
 
+from analysis.command.awaited import OTHER_SOURCE
 from analysis.metrics.causes import Truths
 from analysis.metrics.perceptual import jod
 from analysis.metrics.quality import DisplayedImages, reference_times
@@ -130,7 +131,7 @@ def evaluate(case: Case, key: str, place: Resources) -> str:
         ValueError: this process runs another source than the process that asked.
     """
     if key != case.key(source_of_results()):
-        raise ValueError(f"{case.name}: expected source {key}, this worker runs another one")
+        raise ValueError(OTHER_SOURCE)
     (place.results / "stills").mkdir(parents=True, exist_ok=True)
     if finished(key, place) is not None:
         return key

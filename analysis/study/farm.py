@@ -6,13 +6,13 @@ address, whose workers see the same folders and run the same source.
 
 from __future__ import annotations
 
-import ctypes
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Protocol
 
+from analysis.command.awaited import ended, not_shared, unseen
 from analysis.command.cli import bad_input, full_disk
-from analysis.command.cluster import ClusterOptions, connected, ended
+from analysis.command.cluster import ClusterOptions, connected
 from analysis.command.ownership import writable_folder
 from analysis.command.progress import Task, bars
 from analysis.storage.files import PARTIAL
@@ -83,6 +83,7 @@ def run_cases(
         The key of every case's result, and the reason of every failure.
     """
     from analysis.study.evaluation import finished, source_of_results
+    from analysis.study.workers import Prepared
 
     source = source_of_results()
     content_of.cache_clear()
@@ -94,26 +95,21 @@ def run_cases(
         return keys, failures
     try:
         with connected(options, say) as client:
-            client.run(_keep_freed_memory, on_error="ignore")
-            client.run(_forget_scenes, on_error="ignore")
+            client.register_plugin(Prepared(), name="prepared")
             waiting = _submit(client, missing, keys, place, options.retries)
             for case, _, reason in ended(client, waiting, options.worker_wait_s):
                 if reason is not None:
                     failures[case] = reason
                 task.advance()
+            written = {place.results / f"{keys[case]}.json": case for case in missing if case not in failures}
+            for file in unseen(written) if options.scheduler else ():
+                failures[written[file]] = not_shared(place.results)
     except KeyboardInterrupt:
         if not options.scheduler:  # the workers cannot remove it once they are gone
             for left in place.results.rglob(f"*{PARTIAL}*"):
                 left.unlink(missing_ok=True)
         raise
     return keys, failures
-
-
-def _forget_scenes() -> None:
-    """For workers that have run earlier studies."""
-    from analysis.study.scenery import forget
-
-    forget()
 
 
 def describe_failures(failures: Mapping[str, str]) -> list[str]:
@@ -125,21 +121,6 @@ def describe_failures(failures: Mapping[str, str]) -> list[str]:
         f"failed: {names[0]}{f' and {len(names) - 1} more' if len(names) > 1 else ''}: {reason}"
         for reason, names in by_reason.items()
     ]
-
-
-def _keep_freed_memory() -> None:
-    """Makes a worker keep the memory that it frees, in one heap for all of its threads.
-
-    A worker allocates and frees hundreds of images a second. By default glibc returns each to the system, and
-    allocating them again takes a third of the worker's time. With another C library this function does nothing.
-    """
-    arena_max, mmap_threshold, trim_threshold = -8, -3, -1
-    try:
-        tune = ctypes.CDLL("libc.so.6").mallopt
-    except (OSError, AttributeError):
-        return
-    for option, value in ((arena_max, 1), (mmap_threshold, 1 << 30), (trim_threshold, (1 << 31) - 1)):
-        tune(option, value)
 
 
 def _submit(

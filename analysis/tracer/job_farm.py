@@ -12,8 +12,9 @@ from functools import lru_cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from analysis.command.awaited import OTHER_SOURCE, ended, not_shared, unseen
 from analysis.command.cli import InputError
-from analysis.command.cluster import ClusterOptions, connected, ended
+from analysis.command.cluster import ClusterOptions, connected
 from analysis.command.progress import Bars
 from analysis.storage.reference import content_hash
 from analysis.storage.store import Store
@@ -35,8 +36,8 @@ def run_job_anywhere(work: PreparedJob, options: JobOptions, bars: Bars) -> list
     """Like :func:`analysis.tracer.jobs.run_job`; with a scheduler, its workers render what is missing.
 
     Raises:
-        InputError: nothing answers at the scheduler's address, it is gone or without workers, or a worker runs another
-            source.
+        InputError: nothing answers at the scheduler's address, it is gone or without workers, a worker runs another
+            source, or writes to another folder of the same name.
         ValueError: a file of another origin lies where a frame belongs.
     """
     rendered = Counter[str]()
@@ -66,11 +67,14 @@ def _rendered(client: Client, work: PreparedJob, options: JobOptions, bars: Bars
         for frame in missing
     }
     rendered = Counter[str]()
-    for name, _, reason in ended(client, waiting):
+    for name, _, reason in ended(client, waiting, options.worker_wait_s):
         if reason is not None:
             raise InputError(f"{name}: {reason}")
         rendered[name] += 1
         task.advance()
+    stores = [_store(combination, options, content) for combination in work.job.combinations]
+    for absent in unseen(stores[at].folder / _name(stores[at], number, options) for at, number in missing):
+        raise InputError(not_shared(absent.parent))
     return rendered
 
 
@@ -104,7 +108,7 @@ def _opened(options: JobOptions, content: str) -> tuple[PreparedJob, Renderer]:
 
     work = prepare(options)
     if content_of(work) != content:
-        raise ValueError(f"{options.job}: expected source and scene {content[:16]}, this worker has others")
+        raise ValueError(f"{options.job}: {OTHER_SOURCE}, or give it the same scene")
     return work, Renderer(work.scene, threads=options.threads or None, seed=options.seed)
 
 

@@ -9,8 +9,8 @@ from typing import Annotated, Literal
 import tyro
 
 from analysis.command import limits
-from analysis.command.cluster import ClusterOptions
-from analysis.command.options import Device, Scheduler, Seed, Threads, Unprefixed
+from analysis.command.cluster import WAIT_S, ClusterOptions
+from analysis.command.options import Device, Scheduler, Seed, Threads, Unprefixed, WorkerWait
 from analysis.tracer.film_options import FilmOptions
 from renderer.sampling import POINT_SETS
 from tsar.config import closed_choices, require
@@ -164,6 +164,7 @@ class JobOptions:
     """Seed of all random numbers; of point sets and shifts."""
     threads: Threads = 0
     scheduler: Scheduler = ""
+    worker_wait_s: WorkerWait = WAIT_S
     out: Path = Path("out/job")
     """Folder for the results; summary.json and a folder of frames for each combination; frames that an interrupted run
     of the same job left there are kept."""
@@ -178,4 +179,5 @@ class JobOptions:
             box_share=(1e-6, 1.0),
             seed=limits.SEEDS,
             threads=limits.THREADS,
+            worker_wait_s=limits.WORKER_WAITS_S,
         )

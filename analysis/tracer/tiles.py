@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from analysis.command.awaited import OTHER_SOURCE
 from analysis.command.progress import Task
 from analysis.storage.reference import content_hash
 from analysis.storage.source import brought, code_hash
@@ -123,7 +124,7 @@ def render_chunk(picture: PictureTask, tiles: Sequence[int]) -> tuple[NDArray[np
     from renderer.sampling.plan import SamplePlan
 
     if picture.source != source_of(picture.scene, picture.look, picture.point_set):
-        raise ValueError(f"{picture.scene}: expected source {picture.source[:16]}, this worker runs another one")
+        raise ValueError(f"{picture.scene}: {OTHER_SOURCE}")
     renderer = _renderer(picture.scene, picture.look, picture.seed, picture.threads)
     plan = SamplePlan(picture.samples, picture.point_set, picture.seed, picture.space_filter)  # type: ignore[arg-type]
     start = time.perf_counter()

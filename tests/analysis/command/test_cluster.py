@@ -5,6 +5,8 @@ from __future__ import annotations
 import socket
 import subprocess
 import sys
+from types import SimpleNamespace
+from typing import Any
 
 import pytest
 
@@ -58,6 +60,25 @@ def test_a_port_that_accepts_but_does_not_speak_the_protocol_is_refused(
     address = f"tcp://127.0.0.1:{port.getsockname()[1]}"
     with pytest.raises(InputError, match="sends no greeting"), cluster.connected(cluster.ClusterOptions(0, address)):
         pass
+
+
+def test_a_dashboard_elsewhere_is_told_as_it_can_be_reached(port: socket.socket) -> None:
+    """Its scheduler may show it on loopback alone, lack bokeh, or run without it."""
+    number = port.getsockname()[1]
+
+    def told(has_bokeh: bool = True, services: dict[str, int] | None = None) -> str:
+        scheduler: Any = SimpleNamespace(
+            run_on_scheduler=lambda function: has_bokeh,
+            dashboard_link=f"http://127.0.0.1:{number}/status",
+            scheduler_info=lambda: {"services": {"dashboard": number} if services is None else services},
+        )
+        return cluster.dashboard_of(scheduler, elsewhere=True)
+
+    assert "bokeh is not installed on the scheduler's machine" in told(has_bokeh=False)
+    assert told(services={}).endswith("the scheduler was started without it")
+    assert f"127.0.0.1:{number} on the scheduler's machine alone" in told()
+    port.listen()
+    assert told() == f"dashboard of Dask: http://127.0.0.1:{number}/status"
 
 
 def test_a_dead_scheduler_is_told_before_slow_imports(port: socket.socket) -> None:

@@ -161,7 +161,7 @@ def test_a_run_that_fails_leaves_nothing_that_counts(place: Resources) -> None:
 
 
 def test_another_source_is_refused(place: Resources) -> None:
-    with pytest.raises(ValueError, match="this worker runs another"):
+    with pytest.raises(ValueError, match="expected a worker with the source of the command"):
         evaluate(case(), case().key("other source"), place)
 
 

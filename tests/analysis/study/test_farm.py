@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import os
 import signal
 import subprocess
@@ -10,13 +11,16 @@ import threading
 import time
 import urllib.request
 from collections.abc import Iterator
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 import dask.config
 import psutil
 import pytest
+from distributed import get_worker
 
+from analysis.command.awaited import unseen
 from analysis.command.cluster import ClusterOptions, connected
 from analysis.command.progress import Task
 from analysis.study import farm
@@ -123,6 +127,12 @@ def test_runs_whose_workers_die_fail_with_the_reason(place: Resources, monkeypat
     assert all("KilledWorker" in reason for reason in failures.values()), failures
 
 
+def started_worker(address: str) -> subprocess.Popen:
+    command = [sys.executable, "-m", "distributed.cli.dask_worker", address, "--no-nanny", "--no-dashboard"]
+    home = {**os.environ, "PYTHONPATH": str(ROOT)}
+    return subprocess.Popen(command, stderr=subprocess.DEVNULL, cwd=ROOT, env=home)
+
+
 @pytest.fixture
 def cluster() -> Iterator[tuple[str, subprocess.Popen, list[subprocess.Popen]]]:
     """Address and processes of a scheduler and a worker of others."""
@@ -134,10 +144,9 @@ def cluster() -> Iterator[tuple[str, subprocess.Popen, list[subprocess.Popen]]]:
     address = line.split()[-1]
     drain = threading.Thread(target=scheduler.stderr.read, daemon=True)
     drain.start()
-    command = [*module, "distributed.cli.dask_worker", address, "--no-nanny", "--no-dashboard"]
-    worker = subprocess.Popen(command, stderr=subprocess.DEVNULL, **home)
-    yield address, scheduler, [worker]
-    for process in (worker, scheduler):
+    workers = [started_worker(address)]
+    yield address, scheduler, workers
+    for process in (*workers, scheduler):
         process.kill()
         process.wait()
 
@@ -148,7 +157,10 @@ def test_a_cluster_that_ends_is_said(
 ) -> None:
     address, scheduler, workers = cluster
     monkeypatch.setattr(farm, "_prepare", sleep_as_a_run)
-    asked = cases(3)
+    asked, logged = cases(3), list[logging.LogRecord]()
+    seen = logging.Handler()
+    seen.emit = logged.append
+    monkeypatch.setattr(logging.getLogger("distributed.client"), "handlers", [seen])
 
     def end() -> None:
         for process in [scheduler] if ended == "scheduler" else workers:
@@ -165,7 +177,52 @@ def test_a_cluster_that_ends_is_said(
     _, failures = run_cases(asked, place, ClusterOptions(scheduler=address, worker_wait_s=3))
     assert set(failures) == set(asked)
     expected = "no worker was there" if ended == "workers" else "scheduler"
-    assert all(expected in reason for reason in failures.values()), failures
+    assert all(expected in reason and reason.endswith(GO_ON) for reason in failures.values()), failures
+    assert not [record for record in logged if record.exc_info]
+
+
+GO_ON = "the same command goes on with what is missing"
+
+
+def test_results_that_are_not_here_are_failures(
+    cluster: Any, place: Resources, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(farm, "_prepare", keep_nothing)
+    monkeypatch.setattr(farm, "_evaluate", keep_nothing)
+    monkeypatch.setattr(farm, "unseen", partial(unseen, wait_s=0.0))
+    _, failures = run_cases(cases(2), place, ClusterOptions(scheduler=cluster[0]))
+    (reason,) = set(failures.values())
+    assert len(failures) == 2 and reason.endswith("all machines must see the same folder --out")
+
+
+def test_files_of_other_machines_are_waited_for(tmp_path: Path) -> None:
+    asked = [tmp_path / "one", tmp_path / "two"]
+    threading.Timer(0.3, asked[0].touch).start()
+    assert unseen(asked, wait_s=2.0) == asked[1:]
+
+
+def prepared_alone(*_: Any) -> None:
+    if "prepared" not in get_worker().plugins:
+        raise ValueError("this worker is not prepared")
+
+
+def test_workers_that_come_later_are_prepared_too(
+    cluster: Any, place: Resources, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    address, _, workers = cluster
+    workers[0].kill()
+    for name in ("_prepare", "_evaluate"):
+        monkeypatch.setattr(farm, name, prepared_alone)
+    monkeypatch.setattr(farm, "unseen", lambda files: [])
+    submit = farm._submit
+
+    def submit_and_start(*given: Any) -> Any:
+        found = submit(*given)
+        workers.append(started_worker(address))
+        return found
+
+    monkeypatch.setattr(farm, "_submit", submit_and_start)
+    assert run_cases(cases(2), place, ClusterOptions(scheduler=address))[1] == {}
 
 
 def test_a_reason_is_said_once() -> None:

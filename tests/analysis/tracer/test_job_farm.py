@@ -9,6 +9,7 @@ from typing import Any
 
 import pytest
 
+from analysis.command.awaited import unseen
 from analysis.command.cli import InputError
 from analysis.command.progress import Bars, Task
 from analysis.tracer import job_farm
@@ -51,11 +52,34 @@ def test_frames_of_workers_are_those_of_one_process_and_are_kept(job: JobOptions
 
 def test_a_worker_with_another_scene_or_source_renders_nothing(job: JobOptions, scheduler: str) -> None:
     work = prepare(job)
-    with pytest.raises(ValueError, match="job.txt: expected source and scene 0000000000000000, this worker has others"):
+    with pytest.raises(ValueError, match="job.txt: expected a worker with the source of the command"):
         job_farm.render_frame(job, 0, 80, "0" * 64)
     assert not job.out.exists()
     job_farm.render_frame(job, 0, 80, content_of(work))
     assert len(frames(job.out)) == 1
+
+
+def test_a_job_waits_for_workers_as_long_as_is_asked(job: JobOptions) -> None:
+    from distributed import LocalCluster
+
+    asked = replace(job, worker_wait_s=1.0)
+    none: Any = LocalCluster(n_workers=0, host="127.0.0.1", dashboard_address=":0")
+    with none, pytest.raises(InputError, match=r"no worker was there for 1 s \(--worker-wait-s waits longer\)"):
+        job_farm.run_job_anywhere(prepare(job), replace(asked, scheduler=none.scheduler_address), Bars())
+
+
+def render_nothing(*_: Any) -> None:
+    """In place of a worker that writes into another folder of the same name."""
+
+
+def test_frames_that_are_not_here_are_not_rendered_again(
+    job: JobOptions, scheduler: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(job_farm, "render_frame", render_nothing)
+    monkeypatch.setattr(job_farm, "unseen", lambda files: unseen(files, wait_s=0.0))
+    with pytest.raises(InputError, match="all machines must see the same folder --out"):
+        job_farm.run_job_anywhere(prepare(job), replace(job, scheduler=scheduler), Bars())
+    assert not frames(job.out)
 
 
 def test_a_scheduler_that_ends_is_one_line_and_frames_stay(job: JobOptions) -> None:

@@ -125,7 +125,7 @@ def test_an_interrupted_picture_goes_on_where_it_stopped(client, expected, tmp_p
 
 def test_a_worker_of_another_source_renders_nothing() -> None:
     """It would render an older scene, or by older code."""
-    with pytest.raises(ValueError, match="quad-light: expected source old, this worker runs another one"):
+    with pytest.raises(ValueError, match="quad-light: expected a worker with the source of the command"):
         render_chunk(dataclasses.replace(PICTURE, source="old"), [0])
 
 
