@@ -13,6 +13,7 @@ import socket
 import sys
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from importlib.metadata import PackageNotFoundError, version
 from multiprocessing import resource_tracker
 from typing import TYPE_CHECKING, Literal
 
@@ -149,8 +150,7 @@ def dashboard_of(client: Client, elsewhere: bool) -> str:
         client: a client of the scheduler.
         elsewhere: whether the scheduler is not of this process, so that its packages and its network are others.
     """
-    has_bokeh = client.run_on_scheduler(_has_bokeh) if elsewhere else has_module("bokeh")
-    if not has_bokeh:
+    if not _has_bokeh(client, elsewhere):
         where = " on the scheduler's machine" if elsewhere else ""
         return f"dashboard of Dask: none, because the package bokeh is not installed{where}; {installed_by('study')}"
     link, port = client.dashboard_link, client.scheduler_info()["services"].get("dashboard")
@@ -165,11 +165,14 @@ def dashboard_of(client: Client, elsewhere: bool) -> str:
     return f"dashboard of Dask: {link}"
 
 
-def _has_bokeh() -> bool:
-    """Runs on the scheduler."""
-    from importlib.util import find_spec
-
-    return find_spec("bokeh") is not None
+def _has_bokeh(client: Client, elsewhere: bool) -> bool:
+    if not elsewhere:
+        return has_module("bokeh")
+    try:
+        client.run_on_scheduler(version, "bokeh")  # a function that every scheduler has, whatever its source
+    except PackageNotFoundError:
+        return False
+    return True
 
 
 class _NoTracebacks(logging.Filter):

@@ -66,15 +66,15 @@ def test_a_dashboard_elsewhere_is_told_as_it_can_be_reached(port: socket.socket)
     """Its scheduler may show it on loopback alone, lack bokeh, or run without it."""
     number = port.getsockname()[1]
 
-    def told(has_bokeh: bool = True, services: dict[str, int] | None = None) -> str:
+    def told(package: str = "pytest", services: dict[str, int] | None = None) -> str:
         scheduler: Any = SimpleNamespace(
-            run_on_scheduler=lambda function: has_bokeh,
+            run_on_scheduler=lambda function, name: function(package),
             dashboard_link=f"http://127.0.0.1:{number}/status",
             scheduler_info=lambda: {"services": {"dashboard": number} if services is None else services},
         )
         return cluster.dashboard_of(scheduler, elsewhere=True)
 
-    assert "bokeh is not installed on the scheduler's machine" in told(has_bokeh=False)
+    assert "bokeh is not installed on the scheduler's machine" in told(package="nothing-of-this-name")
     assert told(services={}).endswith("the scheduler was started without it")
     assert f"127.0.0.1:{number} on the scheduler's machine alone" in told()
     port.listen()

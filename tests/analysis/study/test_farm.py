@@ -18,7 +18,6 @@ from typing import Any
 import dask.config
 import psutil
 import pytest
-from distributed import get_worker
 
 from analysis.command.awaited import unseen
 from analysis.command.cluster import ClusterOptions, connected
@@ -59,7 +58,7 @@ def fail_once(animation: Any, start_s: float, scale: Scale, place: Resources) ->
     raise ValueError("the first try")
 
 
-def keep_nothing(case: Case, key: str, place: Resources, reference: None) -> str:
+def keep_nothing(case: Case, key: str, *_: Any) -> str:
     return key
 
 
@@ -201,28 +200,15 @@ def test_files_of_other_machines_are_waited_for(tmp_path: Path) -> None:
     assert unseen(asked, wait_s=2.0) == asked[1:]
 
 
-def prepared_alone(*_: Any) -> None:
-    if "prepared" not in get_worker().plugins:
-        raise ValueError("this worker is not prepared")
-
-
-def test_workers_that_come_later_are_prepared_too(
-    cluster: Any, place: Resources, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    address, _, workers = cluster
-    workers[0].kill()
-    for name in ("_prepare", "_evaluate"):
-        monkeypatch.setattr(farm, name, prepared_alone)
-    monkeypatch.setattr(farm, "unseen", lambda files: [])
-    submit = farm._submit
-
-    def submit_and_start(*given: Any) -> Any:
-        found = submit(*given)
-        workers.append(started_worker(address))
-        return found
-
-    monkeypatch.setattr(farm, "_submit", submit_and_start)
-    assert run_cases(cases(2), place, ClusterOptions(scheduler=address))[1] == {}
+def test_every_worker_keeps_freed_memory_whenever_it_comes(place: Resources, monkeypatch: pytest.MonkeyPatch) -> None:
+    kept = list[bool]()
+    monkeypatch.setattr(farm, "_keep_freed_memory", lambda: kept.append(True))
+    monkeypatch.setattr("analysis.study.evaluation.evaluate", keep_nothing)
+    monkeypatch.setattr("analysis.study.scenery.render_reference", keep_nothing)
+    (case,) = cases(1)
+    farm._prepare(case.animation, case.start_s, case.scale, place)
+    farm._evaluate(case, "key", place, None)
+    assert len(kept) == 2
 
 
 def test_a_reason_is_said_once() -> None:
