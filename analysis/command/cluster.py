@@ -153,7 +153,7 @@ def dashboard_of(client: Client, elsewhere: bool) -> str:
     if not _has_bokeh(client, elsewhere):
         where = " on the scheduler's machine" if elsewhere else ""
         return f"dashboard of Dask: none, because the package bokeh is not installed{where}; {installed_by('study')}"
-    link, port = client.dashboard_link, client.scheduler_info()["services"].get("dashboard")
+    link, port = client.dashboard_link or "", client.scheduler_info()["services"].get("dashboard")
     if elsewhere and not port:
         return "dashboard of Dask: none, because the scheduler was started without it"
     try:
