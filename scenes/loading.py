@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from scenes.arithmetic import power
 from scenes.canonical import SceneError
-from scenes.pictures import Pixels, decoded
+from scenes.pictures import Pixels, alpha_of, decoded
 
 ASSETS = Path(__file__).parent / "assets"
 
@@ -75,6 +75,32 @@ def read_image(path: Path) -> Pixels:
     if not path.is_file():
         raise SceneError(f"texture {path}: expected an image file, found none")
     return _image(path, state_of(path))[0]
+
+
+def read_values(path: Path) -> Pixels:
+    """The values of an image ``(h, w, 3)`` as they are in the file, integers as fractions of the greatest one; not
+    read-only.
+
+    Raises:
+        SceneError: the file cannot be read.
+    """
+    try:
+        found = decoded(path)
+    except Exception as error:  # decoders raise arbitrary exceptions on broken files
+        raise SceneError(f"texture {path}: cannot be read: {one_line(error)}") from error
+    most = 1.0 if found.dtype == np.float32 else np.iinfo(found.dtype).max  # type: ignore[type-var]
+    values = found.astype(np.float32) / np.float32(most)
+    if not np.isfinite(values).all():
+        raise SceneError(f"texture {path}: expected finite values")
+    return values
+
+
+def read_alpha(path: Path) -> Pixels:
+    """The opacity ``(h, w)`` of an image; 1 where the format has none that is read here."""
+    try:
+        return alpha_of(path)
+    except Exception:  # not a picture of Pillow's: one of floating-point numbers, or broken
+        return np.ones((1, 1), np.float32)
 
 
 def is_linear(path: Path) -> bool:

@@ -59,7 +59,9 @@ def by_pillow(path: Path | BinaryIO) -> Pixels | NDArray[np.uint8] | NDArray[np.
             return _three(np.array(image, np.float32)[..., None])
         if image.mode.startswith("I"):  # 16-bit grey
             return _three(np.clip(np.array(image), 0, 65535).astype(np.uint16)[..., None])
-        return np.array(image.convert("RGB"))
+        # a palette with several opacities is only converted to colours by way of RGBA without a warning
+        through = "RGBA" if image.mode == "P" and "transparency" in image.info else image.mode
+        return np.array(image.convert(through).convert("RGB"))
 
 
 def alpha_of(path: Path | BinaryIO) -> Pixels:

@@ -20,8 +20,8 @@ from scenes.models.sources import Sources
 Read = Callable[[Sources, LossReport, bool, float], Model]
 
 
-def _parts_by(read: Callable[[Sources, LossReport], tuple[Instance, ...]]) -> Read:
-    return lambda sources, report, facets, time_s: Model(read(sources, report))
+def _parts_by(read: Callable[[Sources, LossReport, bool], tuple[Instance, ...]]) -> Read:
+    return lambda sources, report, facets, time_s: Model(read(sources, report, facets))
 
 
 def _read_usd(sources: Sources, report: LossReport, facets: bool, time_s: float) -> Model:

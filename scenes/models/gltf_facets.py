@@ -33,6 +33,7 @@ from scenes.formats.appearance.mixtures import NOTHING
 from scenes.formats.appearance.spectra import grey, rgb
 from scenes.formats.losses import LossReport
 from scenes.models.gltf_textures import Lookup, Textures, lookup_of
+from scenes.models.phong_of_parts import scaled
 
 ALONG_PATHS = {"KHR_materials_clearcoat", "KHR_materials_specular"}
 """Extensions that only this module reads."""
@@ -59,7 +60,9 @@ class FacetMaterials:
     def __init__(self, textures: Textures, report: LossReport) -> None:
         self.textures, self.report = textures, report
 
-    def material(self, given: dict[str, Any], base: Texture, shared: Lookup | None, where: str) -> Material:
+    def material(
+        self, given: dict[str, Any], base: Texture, shared: Lookup | None, where: str, veil: Texture
+    ) -> Material:
         """The material with the given properties.
 
         Args:
@@ -67,6 +70,7 @@ class FacetMaterials:
             base: base colour.
             shared: lookup of its textures; None if there are no coordinates.
             where: place for messages.
+            veil: opacity of the vertices, an image only where there are no textures.
         """
         extensions, parts = given.get("extensions", {}), given.get("pbrMetallicRoughness", {})
         pictures = {name: self._alike(name, lookup, shared, where) for name, lookup in lookups_beside(given)}
@@ -101,7 +105,7 @@ class FacetMaterials:
         if normal is not None:
             scale = float(given["normalTexture"].get("scale", 1.0))
             found = NormalMapped(found, self._picture(normal, where, numbers=True), scale)
-        return self._with_holes(given, found, shared, where)
+        return self._with_holes(given, found, shared, where, veil)
 
     def medium(self, given: dict[str, Any], where: str) -> Medium | None:
         """The medium within a surface that light passes, if it has a volume.
@@ -172,18 +176,21 @@ class FacetMaterials:
     def _picture(self, lookup: Lookup, where: str, numbers: bool = False) -> Texture:
         return self.textures.texture(lookup, self.textures.picture(lookup, numbers), where)
 
-    def _with_holes(self, given: dict[str, Any], material: Material, shared: Lookup | None, where: str) -> Material:
+    def _with_holes(
+        self, given: dict[str, Any], material: Material, shared: Lookup | None, where: str, veil: Texture
+    ) -> Material:
         mode, parts = given.get("alphaMode", "OPAQUE"), given.get("pbrMetallicRoughness", {})
         if mode not in ("MASK", "BLEND"):
             return material
-        factor = np.float32(np.clip(parts.get("baseColorFactor", (1.0, 1.0, 1.0, 1.0))[3], 0.0, 1.0))
+        factor = float(np.clip(parts.get("baseColorFactor", (1.0, 1.0, 1.0, 1.0))[3], 0.0, 1.0))
         cutoff = float(given.get("alphaCutoff", 0.5)) if mode == "MASK" else None
+        if not isinstance(veil, ConstantTexture):
+            return Masked(material, scaled(veil, factor), cutoff)
+        factor *= min(max(veil.value[0], 0.0), 1.0)
         lookup = lookup_of(parts.get("baseColorTexture"))
         if lookup is None or shared is None:
-            return (
-                Masked(material, ConstantTexture(rgb(np.full(3, float(factor)))), cutoff) if factor < 1.0 else material
-            )
-        opacity = self.textures.texture(lookup, self.textures.opacity(lookup) * factor, where)
+            return Masked(material, ConstantTexture(rgb(np.full(3, factor))), cutoff) if factor < 1.0 else material
+        opacity = self.textures.texture(lookup, self.textures.opacity(lookup) * np.float32(factor), where)
         return Masked(material, opacity, cutoff)
 
 

@@ -218,7 +218,7 @@ class _Reader:
         painted = self.materials.painted(
             material,
             {index: values[faces] for index, values in sets.items() if values is not None},
-            None if colors is None else colors[faces][..., :3],
+            None if colors is None else colors[faces],
         )
         if normals is None and painted.uvs is None:
             mesh = Mesh(vertices_of(points), faces.astype(np.int32), source=str(self.data.sources.path))

@@ -25,11 +25,12 @@ from scenes.models.gltf_facets import ALONG_PATHS, PARTS, FacetMaterials, lookup
 from scenes.models.gltf_textures import Document, Lookup, Textures, Uvs, lookup_of, multiplied
 from scenes.models.json_records import described
 from scenes.models.phong_of_parts import diffuse_share, glowing, metallic_rough, scaled, seen_through
-from scenes.models.vertex_colours import coloured
+from scenes.models.vertex_colours import coloured_and_covered
 
 _USED = {"KHR_materials_emissive_strength", "KHR_materials_ior", "KHR_materials_transmission", "KHR_materials_unlit",
          "KHR_materials_volume"}  # fmt: skip
 _EVERYWHERE = Lookup(-1)
+_WHITE = ConstantTexture((1.0, 1.0, 1.0))
 
 
 @dataclass(frozen=True)
@@ -61,14 +62,14 @@ class GltfMaterials:
         self._made: dict[int, Material] = {}
 
     def painted(
-        self, number: int | None, sets: dict[int, Uvs], colors: Float[NDArray[np.float64], "f 3 3"] | None
+        self, number: int | None, sets: dict[int, Uvs], colors: Float[NDArray[np.float64], "f 3 channels"] | None
     ) -> Painted:
         """The material of a primitive.
 
         Args:
             number: index of the material; None for the default one.
             sets: texture coordinates ``(f, 3, 2)`` of the corners, by the index of their set.
-            colors: linear colours of the corners.
+            colors: linear colours of the corners, with or without an opacity.
         """
         given = {} if number is None else self.data.at("materials", number)
         where = f"material {given.get('name', number)}" if given else "the default material"
@@ -78,13 +79,17 @@ class GltfMaterials:
             lookup = None
         uvs = None
         tint: Texture | None = None
+        veil: Texture = _WHITE
+        if colors is not None and given.get("alphaMode") not in ("MASK", "BLEND"):
+            colors = colors[..., :3]
         if colors is not None and lookup is None:
-            tint, uvs = coloured(colors * _factor(given, "baseColorFactor"), str(self.data.sources.path))
+            factor = np.append(_factor(given, "baseColorFactor"), 1.0)[: colors.shape[2]]
+            tint, veil, uvs = coloured_and_covered(colors * factor, str(self.data.sources.path))
         elif colors is not None:
-            mean = colors.reshape(-1, 3).mean(axis=0)
+            mean = np.append(colors.reshape(-1, colors.shape[2]).mean(axis=0), 1.0)
             if (colors != 1.0).any():
                 self.report.add(where, "vertex colours in addition to a texture", "their mean times the texture")
-            tint = ConstantTexture(rgb(mean))
+            tint, veil = ConstantTexture(rgb(mean[:3])), ConstantTexture(rgb(mean[[3, 3, 3]]))
         shared = lookup
         if self._facets is not None and lookup is None and uvs is None:
             shared = next((one for _, one in lookups_beside(given) if one.coordinates in sets), None)
@@ -92,15 +97,21 @@ class GltfMaterials:
             uvs = shared.moved(sets[shared.coordinates]).astype(np.float32)
         medium = None if self._facets is None else self._facets.medium(given, where)
         if tint is not None:
-            made = self._material(given, where, lookup, tint, shared)
+            made = self._material(given, where, lookup, tint, shared, veil)
             return Painted(made, uvs, shared is None and uvs is not None, medium)
         key = -1 if number is None else number
         if key not in self._made or (lookup is None) != (lookup_of(_rough(given).get("baseColorTexture")) is None):
-            self._made[key] = self._material(given, where, lookup, None, shared)
+            self._made[key] = self._material(given, where, lookup, None, shared, veil)
         return Painted(self._made[key], uvs, medium=medium)
 
     def _material(
-        self, given: dict[str, Any], where: str, lookup: Lookup | None, tint: Texture | None, shared: Lookup | None
+        self,
+        given: dict[str, Any],
+        where: str,
+        lookup: Lookup | None,
+        tint: Texture | None,
+        shared: Lookup | None,
+        veil: Texture,
     ) -> Material:
         extensions = given.get("extensions", {})
         if given.get("alphaMode", "OPAQUE") not in ("OPAQUE", "MASK", "BLEND"):
@@ -112,7 +123,7 @@ class GltfMaterials:
                 self.report.add(where, name)
         base = self._base(given, where, lookup, tint)
         if self._facets is not None:
-            return self._facets.material(given, base, shared, where)
+            return self._facets.material(given, base, shared, where, veil)
         if "KHR_materials_unlit" in extensions:
             if isinstance(base, ConstantTexture):
                 return Emissive(base.value)
@@ -128,8 +139,8 @@ class GltfMaterials:
         material = self._rough(given, base, where, lookup)
         mode = given.get("alphaMode", "OPAQUE")
         solid: Material = material
-        if mode == "BLEND" and lookup is None:
-            alpha = _rough(given).get("baseColorFactor", (1.0, 1.0, 1.0, 1.0))[3]
+        if mode == "BLEND" and lookup is None and isinstance(veil, ConstantTexture):
+            alpha = _rough(given).get("baseColorFactor", (1.0, 1.0, 1.0, 1.0))[3] * veil.value[0]
             solid = seen_through(material, float(alpha), where, self.report)
         elif mode in ("BLEND", "MASK"):
             self.report.add(where, f"opacity in its texture ({mode})", "opaque")

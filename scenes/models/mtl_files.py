@@ -3,8 +3,9 @@
 ``Kd`` or the image of ``map_Kd`` is the diffuse colour; ``Ks`` and ``Ns`` are the highlight, dimmed so that no more
 light is reflected than arrives. By ``illum``, 0 is a constant colour without lighting, 1 has no highlight, 3 and 8 are
 mirrors by ``Ks``, 5 is a mirror that grows at grazing angles, 4 and 9 are thin panes, 6 and 7 are glass of the index
-``Ni``. ``d`` (or ``1 - Tr``) is the opacity, ``Ke`` the emission. ``Pm`` and ``Pr``, if given, are the metallic share
-and the roughness as in glTF.
+``Ni``. ``d`` (or ``1 - Tr``) is the opacity, ``Ke`` the emission. For path tracing ``map_d`` is the opacity, too: the
+alpha of its image, or its brightness where it has none; and ``norm`` is a normal map. ``Pm`` and ``Pr``, if given, are
+the metallic share and the roughness as in glTF.
 
 Deviation: an image replaces ``Kd`` (the format multiplies them), because exporters leave ``Kd`` at an arbitrary grey.
 
@@ -14,21 +15,37 @@ Source: Wavefront, "MTL material format" (Advanced Visualizer appendix); D. Dods
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import Literal
 
 import numpy as np
 
-from scenes.canonical import ConstantTexture, Emissive, Glass, ImageTexture, Material, Phong, Rgb, SceneError, Texture
+from scenes.canonical import (
+    ConstantTexture,
+    Emissive,
+    Glass,
+    ImageTexture,
+    Masked,
+    Material,
+    NormalMapped,
+    Phong,
+    Rgb,
+    SceneError,
+    Texture,
+)
 from scenes.formats.appearance.folding import mean_of
 from scenes.formats.appearance.spectra import rgb
 from scenes.formats.losses import LossReport
+from scenes.loading import read_alpha, read_values
 from scenes.models.phong_of_parts import EXPONENT_MAX, diffuse_share, glowing, metallic_rough, scaled, seen_through
 from scenes.models.sources import Sources
+from scenes.pictures import Pixels
 
 _FIXED = {"-blendu": 1, "-blendv": 1, "-cc": 1, "-clamp": 1, "-mm": 2, "-texres": 1, "-bm": 1, "-imfchan": 1,
-          "-boost": 1, "-type": 1}  # fmt: skip
+          "-boost": 1, "-type": 1, "-colorspace": 1}  # fmt: skip
 _VECTORS = ("-o", "-s", "-t")
 _MAPS = ("map_", "bump", "disp", "decal", "refl", "norm")
+_ALONG_PATHS = ("map_d", "norm")
 _UNUSED = ("map_ka", "map_aat")  # ambient light, and anti-aliasing of pictures
 
 
@@ -128,24 +145,32 @@ def picture_of(line: str, sources: Sources, where: str, report: LossReport) -> I
     """
     found = map_of(line)
     path, image = sources.picture(found.name)
+    return _texture(found, image, path, where, report)
+
+
+def _texture(
+    found: MtlMap, image: Pixels, path: Path, where: str, report: LossReport, read: frozenset[str] = frozenset()
+) -> ImageTexture:
+    """The texture of an image; options in ``read`` are used by the caller."""
     base, gain = found.pair("-mm", 1.0) if "-mm" in found.options else (0.0, 1.0)
     if (base, gain) != (0.0, 1.0):
         image = np.clip(base + gain * image, 0.0, None).astype(np.float32)
-    for option in found.options.keys() - {"-s", "-o", "-clamp", "-mm"}:
+    for option in sorted(found.options.keys() - {"-s", "-o", "-clamp", "-mm"} - read):
         report.add(where, f"the option {option} of {found.name}")
     wrap: Literal["clamp", "repeat"] = "clamp" if found.options.get("-clamp") == ("on",) else "repeat"
     return ImageTexture(image, found.pair("-s", 1.0), found.pair("-o", 0.0), wrap, source=str(path))
 
 
-def material_of(name: str, entry: _Entry, sources: Sources, report: LossReport) -> Material:
-    """A material of a library.
+def material_of(name: str, entry: _Entry, sources: Sources, report: LossReport, facets: bool = False) -> Material:
+    """A material of a library, for path tracing with ``facets``.
 
     Raises:
         SceneError: a number is invalid, or a diffuse image is missing.
     """
     where = f"material {name}"
+    used = ("map_kd", *_UNUSED, *(_ALONG_PATHS if facets else ()))
     for keyword in entry.lines:
-        if keyword.startswith(_MAPS) and keyword not in ("map_kd", *_UNUSED):
+        if keyword.startswith(_MAPS) and keyword not in used:
             report.add(where, keyword)
     diffuse = entry.color("kd", (0.8, 0.8, 0.8))
     if diffuse is None:
@@ -156,10 +181,36 @@ def material_of(name: str, entry: _Entry, sources: Sources, report: LossReport) 
         texture = picture_of(entry.lines["map_kd"], sources, where, report)
     material = _reflecting(entry, texture, where, report)
     opacity = entry.number("d", 1.0 - entry.number("tr", 0.0))
-    if isinstance(material, Phong):
-        material = seen_through(material, float(np.clip(opacity, 0.0, 1.0)), where, report)
+    opacity = float(np.clip(opacity, 0.0, 1.0))
+    if isinstance(material, Phong) and not facets:
+        material = seen_through(material, opacity, where, report)
     emission = entry.color("ke", (0.0, 0.0, 0.0)) or (0.0, 0.0, 0.0)
-    return glowing(material, rgb(np.maximum(emission, 0.0)), where, report)
+    shining = glowing(material, rgb(np.maximum(emission, 0.0)), where, report)
+    return _along_paths(shining, opacity, entry, sources, where, report) if facets else shining
+
+
+def _along_paths(
+    material: Material, opacity: float, entry: _Entry, sources: Sources, where: str, report: LossReport
+) -> Material:
+    """A material with its normal map and its holes."""
+    if "norm" in entry.lines:
+        found = map_of(entry.lines["norm"])
+        path = sources.require(found.name, "a texture at")
+        normals = _texture(found, read_values(path), path, where, report, frozenset({"-bm"}))
+        scale = _number(found.options["-bm"][0]) if found.options.get("-bm") else 1.0
+        material = NormalMapped(material, normals, scale)
+    if "map_d" in entry.lines:
+        found = map_of(entry.lines["map_d"])
+        path = sources.require(found.name, "a texture at")
+        channel = "".join(found.options.get("-imfchan", ()))
+        values = np.ones((1, 1, 3), np.float32) if channel == "l" else np.repeat(read_alpha(path)[..., None], 3, axis=2)
+        if channel != "m" and (values == 1.0).all():
+            values = np.repeat(read_values(path).mean(axis=2, keepdims=True), 3, axis=2)
+        holes = _texture(found, values * np.float32(opacity), path, where, report, frozenset({"-imfchan"}))
+        return Masked(material, holes)
+    if opacity < 1.0 and not isinstance(material, Glass):
+        return Masked(material, ConstantTexture(rgb(np.full(3, opacity))))
+    return material
 
 
 def _reflecting(entry: _Entry, texture: Texture, where: str, report: LossReport) -> Material:

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from scenes.canonical import Instance, Material, Mesh, Phong, SceneError
 from scenes.canonical.values import vertices_of
+from scenes.formats.geometry.polygons import triangles_of
 from scenes.formats.losses import LossReport
 from scenes.loading import decode_srgb
 from scenes.models.mtl_files import entries, material_of
@@ -24,6 +25,7 @@ from scenes.models.smoothing import corner_normals, with_corners
 from scenes.models.sources import Sources, text_of
 from scenes.models.vertex_colours import coloured
 
+_NAMED = ("usemtl", "mtllib")  # whose names may contain a number sign
 _UNREAD = ("curv", "curv2", "surf", "vp", "p", "l", "lod", "shadow_obj", "trace_obj", "call")
 
 
@@ -48,8 +50,8 @@ class _File:
     unread: set[str] = field(default_factory=set)
 
 
-def read_obj(sources: Sources, report: LossReport) -> tuple[Instance, ...]:
-    """One part for each material of an OBJ file, in the order of their first faces.
+def read_obj(sources: Sources, report: LossReport, facets: bool = False) -> tuple[Instance, ...]:
+    """One part for each material of an OBJ file, in the order of their first faces; for path tracing with ``facets``.
 
     Parts without normals have flat faces, except for faces in a smoothing group (``s``), which have smooth normals.
     Colours after the coordinates of vertices are assumed to be sRGB.
@@ -61,7 +63,7 @@ def read_obj(sources: Sources, report: LossReport) -> tuple[Instance, ...]:
     file = _parsed(text_of(sources.path))
     for keyword in sorted(file.unread):
         report.add(stem, f"lines of the kind {keyword!r}")
-    materials = _materials(file.libraries, sources, report)
+    materials = _materials(file.libraries, sources, report, facets)
     points = _table(file.points, (3, 4, 6, 7, 8), "v")
     uvs, normals = _table(file.uvs, (1, 2, 3), "vt"), _table(file.normals, (3,), "vn")
     if not np.isfinite(points[:, :3]).all():
@@ -70,9 +72,10 @@ def read_obj(sources: Sources, report: LossReport) -> tuple[Instance, ...]:
     for name, group in file.groups.items():
         if name and name not in materials:
             report.add(f"{stem}/{name}", "a material that no library has", "grey")
-        mesh, material = _part(group, points, uvs, normals, materials.get(name, GREY), str(sources.path))
+        where, material = f"{stem}/{name or stem}", materials.get(name, GREY)
+        mesh, material = _part(group, points, uvs, normals, material, str(sources.path), where, report)
         if mesh is not None:
-            parts.append(Instance(mesh, material, name=f"{stem}/{name or stem}"))
+            parts.append(Instance(mesh, material, name=where))
     return tuple(parts)
 
 
@@ -81,6 +84,8 @@ def _parsed(text: str) -> _File:
     name = ""
     for number, line in enumerate(text.replace("\\\n", " ").replace("\\\r\n", " ").splitlines(), start=1):
         keyword, rest = (*line.split(maxsplit=1), "", "")[:2]
+        if "#" in rest and keyword not in _NAMED:
+            rest = rest.partition("#")[0]
         if keyword == "v":
             file.points.append(rest)
         elif keyword == "vt":
@@ -105,7 +110,7 @@ def _parsed(text: str) -> _File:
             word = rest.split()[0]
             smoothing = int(word) if word.isdecimal() else int(word == "on")
         elif keyword == "mtllib":
-            file.libraries.append(rest.strip())
+            file.libraries.append(rest.strip().strip('"'))
         elif keyword in _UNREAD:
             file.unread.add(keyword)
     return file
@@ -139,7 +144,7 @@ def _table(rows: list[str], widths: Sequence[int], keyword: str) -> NDArray[np.f
         raise SceneError(f"cannot be read: {error}") from None
 
 
-def _materials(libraries: list[str], sources: Sources, report: LossReport) -> dict[str, Material]:
+def _materials(libraries: list[str], sources: Sources, report: LossReport, facets: bool) -> dict[str, Material]:
     """Materials of all libraries; of several with one name the first is used."""
     found: dict[str, Material] = {}
     for line in libraries:
@@ -149,7 +154,7 @@ def _materials(libraries: list[str], sources: Sources, report: LossReport) -> di
             path = sources.require(name, "its materials in")
             for material, entry in entries(text_of(path)).items():
                 if material not in found:
-                    found[material] = material_of(material, entry, sources, report)
+                    found[material] = material_of(material, entry, sources, report, facets)
     return found
 
 
@@ -160,22 +165,20 @@ def _part(
     normals: NDArray[np.float64],
     material: Material,
     source: str,
+    where: str,
+    report: LossReport,
 ) -> tuple[Mesh | None, Material]:
-    """The triangles of a group; polygons are split into fans about their first corner."""
+    """The triangles of a group."""
     index = _indices(group, (len(points), len(uvs), len(normals)))
-    starts = np.concatenate([[0], np.cumsum(group.counts)])
-    triangles = np.repeat(np.arange(len(group.counts)), np.asarray(group.counts) - 2)
-    within = np.arange(len(triangles)) - np.repeat(
-        np.cumsum(np.asarray(group.counts) - 2), np.asarray(group.counts) - 2
-    )
-    within += np.asarray(group.counts)[triangles] - 2  # index within each polygon, from 0
-    first = starts[triangles]
-    faces = np.stack([first, first + within + 1, first + within + 2], axis=1)
+    triangles = triangles_of(points[:, :3], index[:, 0], np.asarray(group.counts, np.int64))
+    if triangles.uncovered:
+        report.add(where, f"{triangles.uncovered} concave polygons of many corners", "fans about their first corner")
+    faces = triangles.corners
     if not len(faces):
         return None, material
     at, texture, normal = (index[faces, column] for column in range(3))
     corners = points[at][..., :3]
-    shading = _shading(corners, normal, normals, np.asarray(group.smoothing)[triangles])
+    shading = _shading(corners, normal, normals, np.asarray(group.smoothing)[triangles.polygon])
     coordinates = uvs[texture][..., :2] if len(uvs) and (texture >= 0).any() else None
     if coordinates is not None:
         if coordinates.shape[-1] < 2:

@@ -18,7 +18,7 @@ from scenes.models.vertex_colours import coloured
 GREY = Phong(ConstantTexture((0.5, 0.5, 0.5)))
 
 
-def read_plain(sources: Sources, report: LossReport) -> tuple[Instance, ...]:
+def read_plain(sources: Sources, report: LossReport, facets: bool = False) -> tuple[Instance, ...]:
     """The single part of a file, grey unless its vertices have colours, which are assumed to be sRGB."""
     path = sources.path
     name = f"{path.stem}/{path.stem}"

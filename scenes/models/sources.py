@@ -27,14 +27,28 @@ class Sources:
 
     def find(self, name: str) -> Path | None:
         """The path of a file name, relative to the model's folder; if the name is a path of another machine, its last
-        part is used. None if there is no such file."""
+        part is used, and if only the case of letters differs, that file. None if there is no such file."""
         text = name.replace("\\", "/")
         for candidate in dict.fromkeys((text, unquote(text), text.rpartition("/")[2])):
             path = self.path.parent / candidate
             self.files.setdefault(path, state_of(path))
             if path.is_file():
                 return path
-        return None
+        return self._with_other_case(text)
+
+    def _with_other_case(self, name: str) -> Path | None:
+        """The file of a name whose letters differ in case alone, as on systems that do not tell them apart."""
+        folder, _, wanted = name.rpartition("/")
+        try:
+            names = sorted(path.name for path in (self.path.parent / folder).iterdir())
+        except (OSError, ValueError):
+            return None
+        found = next((one for one in names if one.casefold() == unquote(wanted).casefold()), None)
+        if found is None:
+            return None
+        path = self.path.parent / folder / found
+        self.files.setdefault(path, state_of(path))
+        return path if path.is_file() else None
 
     def require(self, name: str, what: str) -> Path:
         """Like :meth:`find`, but raises SceneError if there is no such file."""

@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 
 from scenes.canonical import Mesh, SceneError
 from scenes.canonical.values import vertices_of
+from scenes.formats.geometry.polygons import triangles_of
 
 _TYPES = {
     "char": "i1", "int8": "i1", "uchar": "u1", "uint8": "u1", "short": "i2", "int16": "i2", "ushort": "u2",
@@ -38,7 +39,7 @@ class _Element:
 
 
 def read_ply(content: bytes, name: str) -> Mesh:
-    """The mesh of a file's content; polygons are fans of triangles.
+    """The mesh of a file's content.
 
     Raises:
         SceneError: it is not a PLY file, or does not match its header.
@@ -73,7 +74,7 @@ def _tables(content: bytes, name: str) -> dict[str, dict[str, NDArray]]:
                 faces, at = _binary_faces(body, at, element, order, name)
             else:
                 faces, at = _ascii_faces(numbers, at, element, name)
-            tables["face"] = {"corners": faces}
+            tables["face"] = dict(zip(("corners", "counts"), faces, strict=True))
         elif numbers is None:
             tables[element.name], at = _binary_columns(body, at, element, order, name)
         else:
@@ -150,14 +151,14 @@ def _numbers(body: memoryview, name: str) -> NDArray[np.float64]:
             raise SceneError(f"{name}: expected numbers behind the PLY header") from None
 
 
-def _binary_faces(body: memoryview, at: int, element: _Element, order: str, name: str) -> tuple[NDArray, int]:
-    """Triangles ``(n, 3)``; fast if all faces have equally many corners, as usual."""
+def _binary_faces(body: memoryview, at: int, element: _Element, order: str, name: str) -> tuple[_Polygons, int]:
+    """Polygons of faces; fast if all faces have equally many corners, as usual."""
     lists = [part for part in element.properties if part[2]]
     wanted = next((part for part in lists if part[0].startswith("vertex_ind")), None)
     if wanted is None:
         raise SceneError(f"{name}: expected a list of vertex indices in faces")
     if element.count == 0:
-        return np.zeros((0, 3)), at
+        return (np.zeros(0), np.zeros(0, np.int64)), at
     position = element.properties.index(wanted)
     before = np.dtype([(f"{n}", order + part[1]) for n, part in enumerate(element.properties[:position])]).itemsize
     counter = np.dtype(order + wanted[2])
@@ -176,21 +177,19 @@ def _binary_faces(body: memoryview, at: int, element: _Element, order: str, name
     if len(lists) == 1 and 3 <= corners <= _CORNERS_MAX and at + element.count * row(corners).itemsize <= len(body):
         rows = np.frombuffer(body, row(corners), element.count, at)
         if (rows["count"] == corners).all():
-            return _fans(rows["corners"]), at + element.count * row(corners).itemsize
+            return _alike(rows["corners"]), at + element.count * row(corners).itemsize
     heads = [struct.Struct(order + np.dtype(part[2] or part[1]).char) for part in element.properties]
     sizes = [(head.size, np.dtype(part[1]).itemsize) for head, part in zip(heads, element.properties, strict=True)]
     places = _places(element, wanted, at, len(body), sizes, lambda n, at: heads[n].unpack_from(body, at)[0], name)
     content, kind = np.frombuffer(body, np.uint8), np.dtype(order + wanted[1])
 
-    def polygons(starts: NDArray[np.int64], corners: int) -> NDArray:
+    def rings(starts: NDArray[np.int64], corners: int) -> NDArray:
         return content[starts[:, None] + np.arange(corners * kind.itemsize)].view(kind)
 
-    return _triangles(*places[:2], polygons), places[2]
+    return _polygons(*places[:2], rings), places[2]
 
 
-def _ascii_faces(
-    numbers: NDArray[np.float64], at: int, element: _Element, name: str
-) -> tuple[NDArray[np.float64], int]:
+def _ascii_faces(numbers: NDArray[np.float64], at: int, element: _Element, name: str) -> tuple[_Polygons, int]:
     """Like :func:`_binary_faces`, for text."""
     if len(element.properties) == 1 and element.count and at < len(numbers):
         corners = numbers[at]
@@ -198,11 +197,11 @@ def _ascii_faces(
         if end <= len(numbers):
             rows = numbers[at:end].reshape(element.count, -1)
             if (rows[:, 0] == corners).all():
-                return _fans(rows[:, 1:]), end
+                return _alike(rows[:, 1:]), end
     wanted = next((part for part in element.properties if part[2] and part[0].startswith("vertex_ind")), None)
     sizes = [(1, 1)] * len(element.properties)
     starts, counts, end = _places(element, wanted, at, len(numbers), sizes, lambda _, at: numbers[at], name)
-    return _triangles(starts, counts, lambda starts, corners: numbers[starts[:, None] + np.arange(corners)]), end
+    return _polygons(starts, counts, lambda starts, corners: numbers[starts[:, None] + np.arange(corners)]), end
 
 
 def _places(
@@ -233,24 +232,25 @@ def _places(
     return np.array(starts, np.int64), np.array(counts, np.int64), at
 
 
-def _triangles(
-    starts: NDArray[np.int64], counts: NDArray[np.int64], polygons: Callable[[NDArray[np.int64], int], NDArray]
-) -> NDArray:
-    """Triangles of polygons in their order; polygons with equally many corners are processed together."""
-    order, parts = [], []
-    for corners in np.unique(counts).tolist():
-        here = np.flatnonzero(counts == corners)
-        order.append(np.repeat(here, corners - 2))
-        parts.append(_fans(polygons(starts[here], corners)))
-    return np.concatenate(parts)[np.argsort(np.concatenate(order), kind="stable")] if order else np.zeros((0, 3))
+_Polygons = tuple[NDArray, NDArray[np.int64]]
+"""Indices of the vertices of all corners, and the number of corners of each polygon."""
 
 
-def _fans(polygons: NDArray) -> NDArray:
-    """Polygons ``(n, corners)`` as triangles about their first corner."""
-    if polygons.shape[1] == 3:
-        return polygons
-    parts = [polygons[:, [0, n, n + 1]] for n in range(1, polygons.shape[1] - 1)]
-    return np.stack(parts, axis=1).reshape(-1, 3)
+def _polygons(
+    starts: NDArray[np.int64], counts: NDArray[np.int64], rings: Callable[[NDArray[np.int64], int], NDArray]
+) -> _Polygons:
+    """Polygons in their order; those with equally many corners are read together."""
+    corners = np.zeros(int(counts.sum()))
+    places = np.cumsum(counts) - counts
+    for count in np.unique(counts).tolist():
+        here = np.flatnonzero(counts == count)
+        corners[places[here, None] + np.arange(count)] = rings(starts[here], count)
+    return corners, counts
+
+
+def _alike(rings: NDArray) -> _Polygons:
+    """Polygons ``(n, corners)`` with equally many corners."""
+    return rings.ravel(), np.full(len(rings), rings.shape[1])
 
 
 def _mesh(tables: dict[str, dict[str, NDArray]], name: str) -> Mesh:
@@ -260,7 +260,16 @@ def _mesh(tables: dict[str, dict[str, NDArray]], name: str) -> Mesh:
     points = np.stack([vertex[axis] for axis in "xyz"], axis=1)
     normals = np.stack([vertex[f"n{axis}"] for axis in "xyz"], axis=1) if "nx" in vertex else None
     uvs = next((np.stack([vertex[u], vertex[v]], axis=1) for u, v in _UVS if u in vertex and v in vertex), None)
-    return checked_mesh(points, face["corners"], normals, uvs, name)
+    corners, counts = face["corners"], face["counts"]
+    faces = corners.reshape(-1, 3) if (counts == 3).all() else corners[:, None]
+    if faces.shape[1] == 3:
+        return checked_mesh(points, faces, normals, uvs, name)
+    _check_numbers(points, faces, normals, uvs, name)
+    triangles = triangles_of(points.astype(np.float64), corners.astype(np.int64), counts)
+    if triangles.uncovered:
+        said = f"{name}: {triangles.uncovered} concave polygons of many corners became fans about their first corner"
+        warnings.warn(said, stacklevel=2)
+    return checked_mesh(points, corners[triangles.corners], normals, uvs, name)
 
 
 def checked_mesh(
@@ -275,11 +284,7 @@ def checked_mesh(
     Raises:
         SceneError: a number is not finite or too great, an index is invalid, or there is no face.
     """
-    for what, array in (("vertices", points), ("normals", normals), ("texture coordinates", uvs)):
-        if array is not None and not (np.abs(array) < 1e30).all():
-            raise SceneError(f"{name}: expected finite {what}")
-    if len(faces) and not ((faces >= 0) & (faces < len(points))).all():
-        raise SceneError(f"{name}: expected indices below {len(points)}, got {faces.max():g}")
+    _check_numbers(points, faces, normals, uvs, name)
     unit = None
     if normals is not None:
         lengths = np.linalg.norm(normals, axis=1, keepdims=True)
@@ -291,3 +296,11 @@ def checked_mesh(
         None if uvs is None else uvs.astype(np.float32),
         name,
     )
+
+
+def _check_numbers(points: NDArray, faces: NDArray, normals: NDArray | None, uvs: NDArray | None, name: str) -> None:
+    for what, array in (("vertices", points), ("normals", normals), ("texture coordinates", uvs)):
+        if array is not None and not (np.abs(array) < 1e30).all():
+            raise SceneError(f"{name}: expected finite {what}")
+    if len(faces) and not ((faces >= 0) & (faces < len(points))).all():
+        raise SceneError(f"{name}: expected indices below {len(points)}, got {faces.max():g}")

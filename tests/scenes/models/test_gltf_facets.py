@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from scenes.canonical import ConstantTexture, Glass, Masked, MetallicRough, NormalMapped, Phong
+from scenes.canonical import ConstantTexture, Glass, ImageTexture, Masked, MetallicRough, NormalMapped, Phong
 from scenes.catalog import load_file
 from scenes.formats.losses import LossReport
 from scenes.models import read_model
@@ -99,3 +99,44 @@ def test_blended_colours_and_rough_glass(tmp_path: Path) -> None:
     )  # fmt: skip
     (part,) = read_model(glass.written(), facets=True)
     assert isinstance(part.material, Glass) and part.material.roughness == (0.25, 0.25) and not part.material.thin
+
+
+def test_the_opacity_of_vertices_counts_where_the_material_has_one(tmp_path: Path) -> None:
+    colors = np.array([[1, 0, 0, 1], [0, 1, 0, 0.25], [0, 0, 1, 0.25], [1, 1, 1, 0.5]], np.float32)
+    for mode, cutoff in (("BLEND", None), ("MASK", 0.5)):
+        file = Gltf(tmp_path)
+        file.attribute("COLOR_0", colors)
+        file.material(alphaMode=mode, pbrMetallicRoughness={"baseColorFactor": [1, 1, 1, 0.8]})
+        (part,) = read_model(file.written(), facets=True)
+        assert isinstance(part.material, Masked) and part.material.cutoff == cutoff
+        opacity = part.material.opacity
+        assert isinstance(opacity, ImageTexture)
+        # at the centres of texels the corners have their own values
+        side = opacity.image.shape[0]
+        places = np.floor(np.stack([part.shape.uvs[:, 0], 1.0 - part.shape.uvs[:, 1]], axis=1) * side).astype(int)
+        found = {
+            tuple(np.round(part.shape.vertices[row, :2], 3).tolist()): float(opacity.image[y, x, 0])
+            for row, (x, y) in enumerate(places)
+        }
+        assert found == pytest.approx({(-1, -1): 0.8, (1, -1): 0.2, (1, 1): 0.2, (-1, 1): 0.4})
+    file.material(alphaMode="OPAQUE")
+    (part,) = read_model(file.written(), facets=True)
+    assert not isinstance(part.material, Masked)
+    file = Gltf(tmp_path)
+    file.attribute("COLOR_0", np.full((4, 4), 0.5, np.float32))
+    file.material(alphaMode="BLEND")
+    (part,) = read_model(file.written(), facets=True)
+    assert part.material.opacity == ConstantTexture((0.5, 0.5, 0.5))
+    report = LossReport()
+    read_model(file.written(), report)
+    assert "an opacity of 0.5" in report.text()
+
+
+def test_the_opacity_of_vertices_multiplies_that_of_a_texture(tmp_path: Path) -> None:
+    Image.new("RGBA", (2, 2), (255, 255, 255, 128)).save(tmp_path / "t.png")
+    file, report = Gltf(tmp_path), LossReport()
+    file.attribute("TEXCOORD_0", np.array(QUAD_UVS, np.float32))
+    file.attribute("COLOR_0", np.array([[1, 1, 1, 0.25 + 0.5 * side] for side in (0, 1, 1, 0)], np.float32))
+    file.material(alphaMode="BLEND", pbrMetallicRoughness={"baseColorTexture": {"index": file.texture("t.png")}})
+    (part,) = read_model(file.written(), report, facets=True)
+    assert part.material.opacity.image[0, 0, 0] == pytest.approx(128 / 255 / 2) and "their mean" in report.text()

@@ -8,7 +8,10 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from scenes.canonical import ConstantTexture, Emissive, Glass, Phong, SceneError
+from renderer import render
+from scenes.canonical import ConstantTexture, Emissive, Glass, Instance, Masked, NormalMapped, Phong, SceneError
+from scenes.catalog import Look
+from scenes.formats.appearance.folding import mean_of
 from scenes.formats.losses import LossReport
 from scenes.models import read_model
 from scenes.models.mtl_files import map_of
@@ -156,3 +159,59 @@ def test_faults_are_named_in_one_line(text: str, message: str, tmp_path: Path) -
     path.write_text("mtllib in.mtl\n" + SQUARE + FACE)
     with pytest.raises(SceneError, match="expected a number, got 'x'"):
         read_model(path)
+
+
+def area(part: Instance) -> float:
+    corners = part.shape.vertices[part.shape.faces]
+    return 0.5 * np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1).sum()
+
+
+@pytest.mark.parametrize(
+    ("points", "expected"),
+    [([(0, 0), (2, 0), (2, 1), (1, 1), (1, 2), (0, 2)], 3.0), ([(0.5, 1), (0, 0), (2, 1), (0, 2)], 1.5)],
+)
+@pytest.mark.parametrize("first", [0, 1, 2])
+def test_concave_polygons_are_covered_once(points: list, expected: float, first: int, tmp_path: Path) -> None:
+    path = tmp_path / "in.obj"
+    corners = (np.roll(np.arange(len(points)), first) + 1).tolist()
+    path.write_text("".join(f"v {x} {y} 0\n" for x, y in points) + f"f {' '.join(map(str, corners))}\n")
+    (part,) = read_model(path)
+    assert len(part.shape.faces) == len(points) - 2 and area(part) == pytest.approx(expected)
+
+
+def test_comments_at_ends_of_lines_and_quoted_libraries(tmp_path: Path) -> None:
+    (tmp_path / "in.mtl").write_text("newmtl a#1\nKd 1 0 0\n")
+    path = tmp_path / "in.obj"
+    path.write_text('mtllib "in.mtl"\n' + SQUARE.replace("\n", " # a line\n") + "usemtl a#1\nf 1 2 3 4# a face\n")
+    (part,) = read_model(path)
+    assert area(part) == pytest.approx(4.0) and part.material.diffuse == ConstantTexture((1.0, 0.0, 0.0))
+
+
+def test_names_of_files_may_differ_in_case(tmp_path: Path) -> None:
+    (tmp_path / "Maps").mkdir()
+    Image.new("RGB", (2, 2), (255, 0, 255)).save(tmp_path / "Maps" / "Bricks.PNG")
+    path = model(tmp_path, "newmtl a\nmap_Kd -colorspace sRGB Maps\\bricks.png\n")
+    (tmp_path / "in.mtl").rename(tmp_path / "IN.MTL")
+    report = LossReport()
+    assert read_model(path, report)[0].material.diffuse.image.shape == (2, 2, 3)
+    assert "the option -colorspace" in report.text()
+
+
+def test_opacity_and_normal_maps_along_paths(tmp_path: Path) -> None:
+    Image.new("RGBA", (2, 2), (255, 255, 255, 51)).save(tmp_path / "alpha.png")
+    Image.new("L", (2, 2), 102).save(tmp_path / "grey.png")
+    Image.new("RGB", (2, 2), (255, 128, 128)).save(tmp_path / "bent.png")
+    Image.new("RGB", (2, 2), (255, 128, 128)).save(tmp_path / "kd.png")
+    for line, opacity in (("d 0.5", 0.5), ("map_d alpha.png", 0.2), ("map_d grey.png", 0.4),
+                          ("map_d -imfchan l alpha.png", 1.0), ("d 0.5\nmap_d grey.png", 0.2)):  # fmt: skip
+        report = LossReport()
+        (part,) = read_model(model(tmp_path, f"newmtl a\nmap_Kd kd.png\n{line}\n"), report, facets=True)
+        assert isinstance(part.material, Masked) and isinstance(part.material.base, Phong) and not report.losses
+        assert mean_of(part.material.opacity) == pytest.approx((opacity,) * 3, abs=1e-3)
+    (part,) = read_model(model(tmp_path, "newmtl a\nnorm -bm 0.5 bent.png\n"), facets=True)
+    assert isinstance(part.material, NormalMapped) and part.material.scale == 0.5
+    assert mean_of(part.material.normals) == pytest.approx((1.0, 128 / 255, 128 / 255)), "numbers, not colours"
+    # the pane stops half of the light
+    look = Look(camera=(0, 0, 5, 0, 0, 0), integrator="path", fov_deg=10.0)
+    path = model(tmp_path, "newmtl a\nKd 0 0 0\nd 0.5\n")
+    assert render(path, 16, samples_per_pixel=64, look=look).mean() == pytest.approx(0.75 / 2, abs=0.03)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import struct
+
 import numpy as np
 import pytest
 import trimesh
@@ -30,7 +32,7 @@ end_header
 """
 
 
-def test_polygons_are_fans() -> None:
+def test_convex_polygons_are_fans() -> None:
     mesh = read_ply(ASCII, "a.ply")
     np.testing.assert_array_equal(mesh.faces, [[0, 1, 2], [0, 2, 3], [0, 1, 4]])
     assert mesh.normals is None and mesh.uvs is None
@@ -98,3 +100,25 @@ def test_binary_headers_that_lie() -> None:
     for cut in range(len(content)):
         with pytest.raises(SceneError):
             read_ply(content[:cut], "a.ply")
+
+
+@pytest.mark.parametrize("order", ["ascii", "binary_little_endian", "binary_big_endian"])
+def test_concave_polygons_are_covered_once(order: str) -> None:
+    """An L, whose fan about its first corner would leave it, and a triangle."""
+    points = [(0, 2), (0, 0), (2, 0), (2, 1), (1, 1), (1, 2)]
+    faces = [(0, 1, 2, 3, 4, 5), (0, 1, 2)]
+    head = f"ply\nformat {order} 1.0\nelement vertex 6\nproperty double x\nproperty short y\nproperty uchar z\n"
+    head += "element face 2\nproperty list uchar ushort vertex_index\nend_header\n"
+    if order == "ascii":
+        rows = [f"{x} {y} 0" for x, y in points] + [f"{len(face)} {' '.join(map(str, face))}" for face in faces]
+        body = "\n".join(rows).encode()
+    else:
+        sign = "<" if "little" in order else ">"
+        body = b"".join(struct.pack(f"{sign}dhB", x, y, 0) for x, y in points)
+        body += b"".join(struct.pack(f"{sign}B{len(face)}H", len(face), *face) for face in faces)
+    mesh = read_ply(head.encode() + body, "a.ply")
+    corners = mesh.vertices[mesh.faces][..., :2].astype(np.float64)
+    edges = corners[:, 1:] - corners[:, :1]
+    areas = 0.5 * (edges[:, 0, 0] * edges[:, 1, 1] - edges[:, 0, 1] * edges[:, 1, 0])
+    assert len(areas) == 5 and (areas > 0.0).all() and areas[:4].sum() == pytest.approx(3.0)
+    np.testing.assert_array_equal(mesh.faces[4], [0, 1, 2])
