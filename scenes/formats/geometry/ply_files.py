@@ -261,24 +261,16 @@ def _mesh(tables: dict[str, dict[str, NDArray]], name: str) -> Mesh:
     normals = np.stack([vertex[f"n{axis}"] for axis in "xyz"], axis=1) if "nx" in vertex else None
     uvs = next((np.stack([vertex[u], vertex[v]], axis=1) for u, v in _UVS if u in vertex and v in vertex), None)
     corners, counts = face["corners"], face["counts"]
-    faces = corners.reshape(-1, 3) if (counts == 3).all() else corners[:, None]
-    if faces.shape[1] == 3:
-        return checked_mesh(points, faces, normals, uvs, name)
-    _check_numbers(points, faces, normals, uvs, name)
+    if (counts == 3).all():
+        return checked_mesh(points, corners.reshape(-1, 3), normals, uvs, name)
+    _check_numbers(points, corners, normals, uvs, name)
     triangles = triangles_of(points.astype(np.float64), corners.astype(np.int64), counts)
     if triangles.uncovered:
-        said = f"{name}: {triangles.uncovered} concave polygons of many corners became fans about their first corner"
-        warnings.warn(said, stacklevel=2)
+        warnings.warn(f"{name}: {triangles.uncovered} concave polygons are fans about their first corner", stacklevel=2)
     return checked_mesh(points, corners[triangles.corners], normals, uvs, name)
 
 
-def checked_mesh(
-    points: NDArray,
-    faces: NDArray,
-    normals: NDArray | None,
-    uvs: NDArray | None,
-    name: str,
-) -> Mesh:
+def checked_mesh(points: NDArray, faces: NDArray, normals: NDArray | None, uvs: NDArray | None, name: str) -> Mesh:
     """A mesh of numbers from a file.
 
     Raises:
