@@ -276,14 +276,15 @@ def _text(fitted: pd.DataFrame, tested: pd.DataFrame, pairs: pd.DataFrame, kind:
         of = [name for name in CONDITIONS if not pd.isna(row[name])]
         if of not in shown:
             continue  # in the table
-        jnd, beside = str(row["status"]), analyses.THESIS_JND.get(row["scene"])
-        if jnd == "within":
+        jnd, beside = f"{row['status']} all levels", analyses.THESIS_JND.get(row["scene"])
+        if row["status"] == "within":
             jnd = f"{row['jnd']:.1f} ({row['low']:.1f} – {row['high']:.1f})"
             if np.isfinite(row.get("psignifit_jnd", np.nan)):
                 low, high = row["psignifit_low"], row["psignifit_high"]
                 jnd += f", by psignifit {row['psignifit_jnd']:.1f} ({low:.1f} – {high:.1f})"
+            jnd += " samples per pixel"
         end = f"; thesis about {beside:.0f}" if beside and of == ["scene"] else ""
-        lines.append(f"{', '.join(str(row[name]) for name in of)}: JND {jnd} samples per pixel{end}")
+        lines.append(f"{', '.join(str(row[name]) for name in of)}: JND {jnd}{end}")
     for row in tested.to_dict("records"):
         if not pd.isna(row["thesis_p"]):
             what = f"{row['first']} against {row['second']} at {row['samples']:.0f}"

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import codecs
+import io
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
@@ -29,7 +31,8 @@ def read_trials(paths: Sequence[Path]) -> tuple[pd.DataFrame, str]:
     """The answered trials of all tables, and the kind of their observers.
 
     Args:
-        paths: files, read as CSV where their names end in ``.csv``, else as Parquet.
+        paths: files, read as CSV where their names end in ``.csv``, else as Parquet. CSV may have commas, semicolons
+            or tabs between values, in any usual encoding; case and blanks of the names of columns do not matter.
 
     Raises:
         InputError: a file cannot be read, as :func:`checked_trials`, or the kinds of two files differ.
@@ -38,7 +41,7 @@ def read_trials(paths: Sequence[Path]) -> tuple[pd.DataFrame, str]:
     for path in paths:
         comma = path.suffix.lower() == ".csv"
         try:
-            table = pd.read_csv(path) if comma else pd.read_parquet(path)
+            table = _csv(path.read_bytes()) if comma else pd.read_parquet(path)
         except (OSError, ValueError) as error:
             reason = " ".join(str(error).split())
             raise InputError(f"trials: {path}: cannot be read as {'CSV' if comma else 'Parquet'} ({reason})") from None
@@ -49,6 +52,21 @@ def read_trials(paths: Sequence[Path]) -> tuple[pd.DataFrame, str]:
         found = ", ".join(f"{kind} in {path}" for kind, path in kinds.items())
         raise InputError(f"trials: expected observers of one kind, got {found}")
     return pd.concat(tables, ignore_index=True), next(iter(kinds))
+
+
+def _csv(content: bytes) -> pd.DataFrame:
+    """A table whose separator is that of its first line; numbers with commas go with semicolons, as spreadsheets write
+    them."""
+    wide = content[:2] in (codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)
+    try:
+        text = content.decode("utf-16" if wide else "utf-8-sig")
+    except UnicodeDecodeError:
+        text = content.decode("cp1252", errors="replace")
+    head = text.lstrip().partition("\n")[0]
+    between = max(",;\t", key=head.count)
+    decimal = "," if between == ";" else "."
+    table = pd.read_csv(io.StringIO(text), sep=between, decimal=decimal, skipinitialspace=True)
+    return table.rename(columns=lambda name: str(name).strip().lower())
 
 
 def undisturbed(trials: pd.DataFrame) -> pd.DataFrame:

@@ -136,3 +136,13 @@ def test_trials_that_did_not_fit_or_dropped_frames_are_left_out(tmp_path: Path) 
     trials, _ = read_trials([file])
     assert list(undisturbed(trials).index) == [0, 3, 4]
     assert len(undisturbed(GOOD)) == len(GOOD), "nothing is said of them"
+
+
+@pytest.mark.parametrize("encoding", ["utf-8", "utf-8-sig", "utf-16", "cp1252"])
+@pytest.mark.parametrize("between", [",", ", ", ";", "\t"])
+def test_csv_as_spreadsheets_write_it(encoding: str, between: str, tmp_path: Path) -> None:
+    rows = [("Observer", " Samples", "correct "), ("é", "8,0" if between == ";" else "8.0", "yes"), ("b", "64", "")]
+    path = tmp_path / "a.csv"
+    path.write_bytes("\r\n".join(between.join(row) for row in rows).encode(encoding))
+    trials, _ = read_trials([path])
+    assert trials[["observer", "samples", "correct"]].to_numpy().tolist() == [["é", 8, True]]
