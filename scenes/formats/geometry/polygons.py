@@ -106,8 +106,8 @@ def _leaves_its_fan(places: Float[NDArray[np.float64], "n c 3"]) -> NDArray[np.b
     """Whether a triangle of the fan about the first corner of a polygon faces away from the polygon."""
     normals = _fan_normals(places)
     whole = normals.sum(axis=1)
-    towards = np.einsum("ncx,nx->nc", normals, whole)
-    return (towards < -_FLAT * np.einsum("nx,nx->n", whole, whole)[:, None]).any(axis=1)
+    towards, away = (normals * whole[:, None]).sum(axis=2), -_FLAT * (whole * whole).sum(axis=1)
+    return (towards < away[:, None]).any(axis=1)
 
 
 def _flattened(places: Float[NDArray[np.float64], "n c 3"]) -> Float[NDArray[np.float64], "n c 2"]:
