@@ -33,7 +33,8 @@ class Posing:
             scene: scene as at the first time.
         """
         self._options, self._scene = options, scene
-        self.anew = is_posed(options.scene)
+        self._facets = options.integrator == "path"  # so that a model is read once
+        self.anew = is_posed(options.scene, self._facets)
         self._time_s, self._renderer = options.time_s, self._of(scene)
 
     def at(self, time_s: float) -> Renderer:
@@ -52,4 +53,4 @@ class Posing:
         """Everything in the input that decides the pictures: the scene, and the files of a model that is posed."""
         if not self.anew:
             return self._scene
-        return self._scene, [np.fromfile(path, np.uint8) for path in files_of(Path(self._options.scene))]
+        return self._scene, [np.fromfile(path, np.uint8) for path in files_of(Path(self._options.scene), self._facets)]

@@ -41,7 +41,7 @@ def opened(options: RenderOptions) -> tuple[Scene, tuple[str, ...]]:
 
     with bad_input():
         scene, losses = catalog.load_seen(options.scene, options.look, options.phase)
-        more = [ANEW] if options.frames > 1 and is_posed(options.scene) else []
+        more = [ANEW] if options.frames > 1 and is_posed(options.scene, options.integrator == "path") else []
         return scene, (*map(str, losses), *more)
 
 

@@ -88,11 +88,9 @@ def read_whole(path: Path, report: LossReport | None = None, facets: bool = Fals
     return model
 
 
-def files_of(path: Path) -> list[Path]:
-    """The files that were found for a model; raises as :func:`read_whole`."""
-    path = Path(path)
-    read_whole(path)
-    return sorted(file for file, state in _at(path, False, 0.0)[1].items() if state is not None)
+def files_of(path: Path, facets: bool) -> list[Path]:
+    """The files that were found for a model; arguments and errors as for :func:`read_whole`."""
+    return sorted(file for file, state in _at(Path(path), facets, 0.0)[1].items() if state is not None)
 
 
 def _at(path: Path, facets: bool, time_s: float) -> _Kept:

@@ -20,10 +20,10 @@ def model_up(path: Path, facets: bool = False) -> Up:
     return read_whole(path, facets=facets).up or ("y" if path.suffix.lower() in _Y_UP else "z")
 
 
-def is_posed(scene: object) -> bool:
+def is_posed(scene: object, facets: bool) -> bool:
     """Whether a scene is the file of a model whose parts are read at one time, since they do not move rigidly."""
     path = Path(scene) if isinstance(scene, (str, Path)) else Path()
-    return path.suffix.lower() in MODEL_ENDINGS and read_whole(path).posed
+    return path.suffix.lower() in MODEL_ENDINGS and read_whole(path, facets=facets).posed
 
 
 def model_scene(

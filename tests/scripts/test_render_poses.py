@@ -8,6 +8,7 @@ import numpy as np
 import OpenEXR
 import pytest
 
+from scenes import models
 from tests.scenes.models.test_poses import channel, with_morphs
 from tests.scripts.commands import call_script
 
@@ -58,3 +59,13 @@ def test_layers_are_those_of_the_pose(
     assert call_script("render.py", monkeypatch, model, *options) == 0
     depths = [depth(path)[16, 24] for path in sorted((tmp_path / "out").glob("frame*"))]
     np.testing.assert_allclose(depths, [9.0, 7.0], atol=0.05)
+
+
+@pytest.mark.parametrize("integrator", ["whitted", "path"])
+def test_a_model_is_read_once(integrator: str, monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    read: list[float] = []
+    real = models._read
+    monkeypatch.setattr(models, "_read", lambda *given: (read.append(given[4]), real(*given))[1])
+    options = "--integrator", integrator, *SIZE, "--out", str(tmp_path / "out")
+    assert call_script("render.py", monkeypatch, raised(tmp_path), *options) == 0
+    assert read == [0.0]
