@@ -56,7 +56,7 @@ class ClusterOptions:
     retries: int = 0
     """Number of times that what failed is tried again; 0 for no run of a study, and 5 times for tiles."""
     worker_wait_s: float = WAIT_S
-    """Seconds without any worker after which the runs of a study fail; workers may wait long in a queue of jobs."""
+    """Seconds without any worker after which a command stops waiting; workers may wait long in a queue of jobs."""
     log_level: Literal["critical", "error", "warning", "info"] = "warning"
     """Least severe messages of Dask that are shown."""
 

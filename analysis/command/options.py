@@ -26,7 +26,7 @@ Scheduler = Annotated[
 WorkerWait = Annotated[
     float,
     tyro.conf.arg(
-        help="Seconds without any worker after which the command ends; workers may wait long in a queue of jobs."
+        help="Seconds without any worker after which a command stops waiting; workers may wait long in a queue of jobs."
     ),
 ]
 
