@@ -16,6 +16,7 @@ from pathlib import Path
 from typing import Any
 
 import dask.config
+import distributed  # noqa: F401  (its defaults must be there before a test sets and restores one)
 import psutil
 import pytest
 
