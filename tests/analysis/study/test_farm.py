@@ -190,7 +190,7 @@ def test_results_that_are_not_here_are_failures(
     monkeypatch.setattr(farm, "_prepare", keep_nothing)
     monkeypatch.setattr(farm, "_evaluate", keep_nothing)
     monkeypatch.setattr(farm, "unseen", partial(unseen, wait_s=0.0))
-    _, failures = run_cases(cases(2), place, ClusterOptions(scheduler=cluster[0]))
+    _, failures = run_cases(cases(2), place, ClusterOptions(scheduler=cluster[0], worker_wait_s=300))
     (reason,) = set(failures.values())
     assert len(failures) == 2 and reason.endswith("all machines must see the same folder --out")
 
