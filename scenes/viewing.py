@@ -13,14 +13,15 @@ from numpy.typing import NDArray
 from scenes.animation import look_at
 from scenes.arithmetic import norm, product, tan
 from scenes.canonical import (
+    Camera,
     DirectionalLight,
     EnvironmentLight,
     Instance,
     Matrix,
-    Mesh,
     PerspectiveCamera,
     Scene,
     SceneError,
+    Shape,
     SunSky,
 )
 from scenes.formats.geometry.meshed import as_mesh
@@ -35,6 +36,7 @@ _FROM = (0.5, -1.0, 0.45)
 """Direction from the target to the camera, with z upwards: in front, to the right and above."""
 
 _MARGIN = 1.08
+_POINTS_MOST = 20_000_000  # of which the world's places are made, 24 bytes each
 _KEY, _FILL, _AMBIENT, _BACKGROUND = 2.2, 0.6, 0.18, 0.75
 
 
@@ -125,8 +127,8 @@ def with_environment(scene: Scene, picture: Pixels, up: Up, source: str = "") ->
     return dataclasses.replace(scene, lights=(*kept, light), background=None, ambient=(0.0, 0.0, 0.0))
 
 
-def framed(instances: tuple[Instance, ...], up: Up, name: str = "") -> Scene:
-    """A scene of instances with a camera that shows all of them, and lights.
+def framed(instances: tuple[Instance, ...], up: Up, name: str = "", camera: Camera | None = None) -> Scene:
+    """A scene of instances with lights, and with a camera that shows all of them unless one is given.
 
     The camera stands in front, to the right and above. A key light comes from its upper left, a weaker one from its
     right, and ambient light fills the shadows; the background is a uniform grey that lights nothing.
@@ -134,26 +136,17 @@ def framed(instances: tuple[Instance, ...], up: Up, name: str = "") -> Scene:
     Raises:
         SceneError: there are no instances.
     """
-    points = np.concatenate([_points(instance) for instance in instances]) if instances else np.zeros((0, 3))
-    if not len(points):
+    if not instances:
         raise SceneError(f"{name or 'scene'}: expected at least one instance, got none")
     turn = turned_up(up)[:3, :3]
     back = product(turn, np.array(_FROM) / norm(np.array(_FROM)))
     axes = camera_at(back, (0.0, 0.0, 0.0), up)[:3, :3]
-    seen = product(points, axes)
-    low, high = seen.min(axis=0), seen.max(axis=0)
-    middle = 0.5 * (low + high)
-    half = _MARGIN * np.abs(seen - middle)[:, :2].max(axis=1)
-    away = float((half / tan(math.radians(FOV_DEG) / 2.0) + seen[:, 2] - middle[2]).max()) or 1.0
-    matrix = np.eye(4)
-    matrix[:3, :3] = axes
-    matrix[:3, 3] = product(axes, middle + np.array([0.0, 0.0, away]))
     lights = tuple(
         DirectionalLight(_direction(-product(axes, np.array(towards))), (strength, strength, strength))
         for towards, strength in (((-0.5, 0.8, 0.7), _KEY), ((0.8, 0.1, 0.6), _FILL))
     )
     background = EnvironmentLight(np.full((1, 1, 3), _BACKGROUND, np.float32))
-    camera = PerspectiveCamera(matrix, FOV_DEG)
+    camera = PerspectiveCamera(_place_before(instances, axes), FOV_DEG) if camera is None else camera
     return Scene(camera, instances, lights, ambient=(_AMBIENT, _AMBIENT, _AMBIENT), name=name, background=background)
 
 
@@ -162,7 +155,30 @@ def _direction(vector: NDArray[np.float64]) -> tuple[float, float, float]:
     return x, y, z
 
 
-def _points(instance: Instance) -> NDArray[np.float64]:
-    mesh = instance.shape if isinstance(instance.shape, Mesh) else as_mesh(instance.shape)
-    used = mesh.vertices[np.unique(mesh.faces)].astype(np.float64)
-    return product(used, instance.to_world[:3, :3].T) + instance.to_world[:3, 3]
+def _place_before(instances: tuple[Instance, ...], axes: NDArray[np.float64]) -> Matrix:
+    """The transform of a camera with these axes that shows all instances; of very many points, their boxes."""
+    shapes = {id(one.shape): one.shape for one in instances}
+    used = {key: _vertices(shape) for key, shape in shapes.items()}
+    if sum(len(used[id(one.shape)]) for one in instances) > _POINTS_MOST:
+        used = {key: _corners(points) for key, points in used.items()}
+    seen = np.concatenate([
+        product(product(used[id(one.shape)], one.to_world[:3, :3].T) + one.to_world[:3, 3], axes) for one in instances
+    ])  # fmt: skip
+    middle = 0.5 * (seen.min(axis=0) + seen.max(axis=0))
+    half = _MARGIN * np.abs(seen - middle)[:, :2].max(axis=1)
+    away = float((half / tan(math.radians(FOV_DEG) / 2.0) + seen[:, 2] - middle[2]).max()) or 1.0
+    matrix = np.eye(4)
+    matrix[:3, :3] = axes
+    matrix[:3, 3] = product(axes, middle + np.array([0.0, 0.0, away]))
+    return matrix
+
+
+def _vertices(shape: Shape) -> NDArray[np.float64]:
+    mesh = as_mesh(shape)
+    return mesh.vertices[np.unique(mesh.faces)].astype(np.float64)
+
+
+def _corners(points: NDArray[np.float64]) -> NDArray[np.float64]:
+    """The corners ``(8, 3)`` of the box around points."""
+    ends = np.stack([points.min(axis=0), points.max(axis=0)])
+    return ends[np.indices((2, 2, 2)).reshape(3, 8).T, np.arange(3)]

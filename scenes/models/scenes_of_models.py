@@ -53,13 +53,13 @@ def model_scene(
         known = ", ".join(model.cameras) or "none"
         raise SceneError(f"camera: expected one of the cameras of {path} ({known}), got {camera!r}")
     shown = tuple(part for part in first.parts if part.emission is None) or first.parts
-    scene = framed(shown, up or model_up(path, facets), path.stem)
-    changed: dict[str, Any] = {}
-    if model.lit:
-        changed |= {"lights": model.lights, "ambient": (0.0, 0.0, 0.0), "background": None}
+    found = None
     if model.cameras:
         found = model.cameras[camera] if camera else next(iter(model.cameras.values()))
-        changed |= {"camera": found.camera, "film": found.film}
+    scene = framed(shown, up or model_up(path, facets), path.stem, None if found is None else found.camera)
+    changed: dict[str, Any] = {} if found is None else {"film": found.film}
+    if model.lit:
+        changed |= {"lights": model.lights, "ambient": (0.0, 0.0, 0.0), "background": None}
     duration_s = duration_of(model.parts)
     return dataclasses.replace(scene, instances=model.parts, duration_s=duration_s, **changed)
 

@@ -9,9 +9,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from scenes import catalog
+from scenes import catalog, viewing
 from scenes.canonical import (
     ConstantTexture,
+    Cube,
     DirectionalLight,
     EnvironmentLight,
     Instance,
@@ -131,3 +132,24 @@ def test_a_camera_path_goes_round_the_target_of_the_given_camera() -> None:
     np.testing.assert_allclose(camera.to_world[:3, 3], (3.0, 4.0, 0.0))
     with pytest.raises(SceneError, match="expected none for a built-in scene"):
         load_seen("plain", Look(fov_deg=30.0), camera_path="turntable")
+
+
+def test_a_camera_that_is_given_is_kept_and_very_many_points_are_seen_by_their_boxes(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    places = [np.diag([1.0, 2.0, 3.0, 1.0]), np.eye(4)]
+    places[1][:3, 3] = (9.0, 1.0, 2.0)
+    balls = tuple(Instance(Sphere(), GREY, place) for place in places)
+    given = PerspectiveCamera()
+    assert viewing.framed(balls, "z", camera=given).camera is given
+    exact = viewing.framed(balls, "z").camera.to_world
+    monkeypatch.setattr(viewing, "_POINTS_MOST", 100)
+    around = viewing.framed(balls, "z").camera.to_world
+    np.testing.assert_array_equal(exact[:3, :3], around[:3, :3])
+    distance = np.linalg.norm(around[:3, 3] - exact[:3, 3])
+    assert 0.0 < distance < 0.5 * np.linalg.norm(exact[:3, 3])
+    cubes = tuple(dataclasses.replace(ball, shape=Cube()) for ball in balls)  # which are their boxes
+    monkeypatch.setattr(viewing, "_POINTS_MOST", 1 << 30)
+    whole = viewing.framed(cubes, "z").camera.to_world
+    monkeypatch.setattr(viewing, "_POINTS_MOST", 1)
+    np.testing.assert_array_equal(whole, viewing.framed(cubes, "z").camera.to_world)

@@ -38,16 +38,18 @@ class ShapeReader:
     files: SceneFiles
     report: LossReport
     more: Mapping[str, Callable[[Parameters, LossReport], Shape]] = field(default_factory=dict)
-    _meshes: dict[Path, Mesh] = field(default_factory=dict)
+    _meshes: dict[tuple[Path, bool], Mesh] = field(default_factory=dict)
 
     def made(self, kind: str, parameters: Parameters, turn_over: bool, beside: Path) -> tuple[Shape, Matrix] | None:
         """A shape and its placement in the current space, or None for a shape that is left out, which is reported."""
         where = str(parameters.place)
         if kind in ("trianglemesh", "mesh", "plymesh", "loopsubdiv"):
-            mesh = self._ply(parameters, beside) if kind == "plymesh" else self._triangles(parameters)
+            mesh = self._ply(parameters, turn_over, beside) if kind == "plymesh" else self._triangles(parameters)
             if mesh is None:
                 parameters.asked.update(parameters.given)
                 return None
+            if kind == "plymesh":
+                return mesh, UNMOVED
             if kind == "loopsubdiv":
                 mesh = self._subdivided(mesh, parameters)
             return facing_normals(turned(mesh) if turn_over else mesh), UNMOVED
@@ -117,14 +119,16 @@ class ShapeReader:
         self.report.add(str(parameters.place), f"shape {kind!r}", f"a mesh of {len(mesh.faces)} triangles")
         return (turned(mesh) if turn_over else mesh), UNMOVED
 
-    def _ply(self, parameters: Parameters, beside: Path) -> Mesh | None:
+    def _ply(self, parameters: Parameters, turn_over: bool, beside: Path) -> Mesh | None:
         where, name = str(parameters.place), parameters.text("filename", "")
         path = self.files.known(name, where, self.report, f"the mesh {name!r}", "left out", beside)
         if path is None:
             return None
-        if path not in self._meshes:
-            self._meshes[path] = facing_normals(read_ply(self.files.read(path, where), str(path)))
-        return self._meshes[path]
+        key = path, turn_over
+        if key not in self._meshes:
+            mesh = read_ply(self.files.read(path, where), str(path))
+            self._meshes[key] = facing_normals(turned(mesh) if turn_over else mesh)
+        return self._meshes[key]
 
     def _indices(self, parameters: Parameters) -> np.ndarray | None:
         """Corners of triangles; each of LuxRender's quads is split into two."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+from weakref import WeakKeyDictionary
 
 import numpy as np
 
@@ -15,6 +16,8 @@ from scenes.formats.losses import LossReport
 
 DISK_MIN, SPHERE_MIN = 32, 512
 """Least number of triangles of a mesh that may be a disk, or a sphere; a mesh with fewer is meant to be angular."""
+
+_KNOWN: WeakKeyDictionary[Mesh, dict[bool, tuple[Shape, Matrix] | None]] = WeakKeyDictionary()
 
 _CLOSE = 1e-4  # relative to a side; files print six digits
 
@@ -97,7 +100,10 @@ def shape_of(mesh: Mesh, material: Material, where: str, report: LossReport) -> 
     Texture coordinates are compared only if the material depends on them.
     """
     textured = mesh.uvs is None or depends_on_uv(material)
-    found = recognised(mesh) or (None if textured else recognised(dataclasses.replace(mesh, uvs=None)))
+    known = _KNOWN.setdefault(mesh, {})  # of a mesh that many shapes share
+    if textured not in known:
+        known[textured] = recognised(mesh) or (None if textured else recognised(dataclasses.replace(mesh, uvs=None)))
+    found = known[textured]
     if found is None:
         return mesh, np.eye(4)
     if isinstance(found[0], Disk | Sphere):

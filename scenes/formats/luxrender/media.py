@@ -21,6 +21,7 @@ from scenes.formats.appearance.spectra import grey
 from scenes.formats.directives.reader import word
 from scenes.formats.directives.scene_reader import SceneReader
 from scenes.formats.directives.syntax import Directive, Parameters, parameters_of
+from scenes.formats.luxrender.cameras import lose_longer_side
 from scenes.formats.luxrender.read_materials import LuxSurfaces
 
 _COEFFICIENTS = {"clear": ("absorption", ""), "homogeneous": ("sigma_a", "sigma_s"),
@@ -64,6 +65,7 @@ class LuxMediaReader(SceneReader):
 
     def finish(self) -> None:
         super().finish()
+        lose_longer_side(self.camera, self.window, self.film, self.report)
         if self._scatters and self._integrator != "multi":
             what = f"the volume integrator {self._integrator!r}, which does not draw all of the scattered light"
             self.report.add(self.files.main.name, what, "all of it")

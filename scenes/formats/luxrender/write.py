@@ -68,6 +68,7 @@ class LuxWriter(LuxSurfaceWriter, SceneWriter):
     """Collects the lines of a LuxRender scene."""
 
     _vacuum: str = ""
+    _hole: str = ""
 
     def write_settings(self, scene: Scene) -> None:
         scene = direct_if_same(scene)
@@ -203,7 +204,8 @@ class LuxWriter(LuxSurfaceWriter, SceneWriter):
         if borders_media(instance):
             if instance.exterior is None and self.medium not in (None, instance.interior):
                 self.report.add(instance.name or "shape", "vacuum behind a medium within another", "the medium around")
-            lines += [f'Interior "{self._volume(instance.interior)}"', f'Exterior "{self._volume(instance.exterior)}"']
+            inside = self._hole if instance.interior is None else self.media[instance.interior]
+            lines += [f'Interior "{inside}"', f'Exterior "{self._volume(instance.exterior)}"']
         if emission is not None:
             off = '"float gain" [ 1 ] "float power" [ 0 ] "float efficacy" [ 0 ]'
             lines.append(f'AreaLightSource "area" "color L" {listed(emission)} {off}')
@@ -221,9 +223,11 @@ class LuxWriter(LuxSurfaceWriter, SceneWriter):
         return f'MakeNamedVolume "{name}" "homogeneous" {parts} "color g" {listed((medium.g,) * 3)}'
 
     def around_camera(self) -> list[str]:
-        """LuxCore has no unnamed vacuum, and takes an exterior outside of blocks for the medium around the camera."""
-        self._vacuum = self.label("vacuum", "vacuum")
-        lines = [f'MakeNamedVolume "{self._vacuum}" "clear" "color absorption" [ 0 0 0 ]']
+        """LuxCore has no unnamed vacuum, and takes an exterior outside of blocks for the medium around the camera.
+        Behind a hole it goes on with the medium around only if the volume of the hole is outside of nothing."""
+        self._vacuum, self._hole = self.label("vacuum", "vacuum"), self.label("hole", "hole")
+        empty = '"clear" "color absorption" [ 0 0 0 ]'
+        lines = [f'MakeNamedVolume "{name}" {empty}' for name in (self._vacuum, self._hole)]
         return [*lines, f'Exterior "{self.media[self.medium]}"'] if self.medium is not None else lines
 
     def _volume(self, medium: Medium | None) -> str:

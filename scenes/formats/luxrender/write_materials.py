@@ -50,6 +50,8 @@ class LuxSurfaceWriter(SurfaceWriter):
 
     def image_line(self, texture: ImageTexture) -> str:
         file = self.output.picture(texture.image, texture.source, (".exr",))
+        if texture.filter == "nearest" and texture.image.shape[:2] != (1, 1):
+            self.report.add(f"texture {texture.source or 'picture'}", "texels with sharp edges", "blended in LuxCore")
         levels = {"nearest": "nearest", "bilinear": "bilinear", "mipmap": "mipmap_ewa"}[texture.filter]
         more = f'"string filtertype" [ "{levels}" ] "float gamma" [ 1 ] '
         return self.placed_image(file, texture, more, *first_row_below(texture.uv_scale, texture.uv_offset))

@@ -17,6 +17,7 @@ from scenes.canonical import (
     Cube,
     Curves,
     Disk,
+    Glass,
     Instance,
     Material,
     Matte,
@@ -30,7 +31,7 @@ from scenes.canonical import (
 )
 from scenes.canonical.values import Matrix
 from scenes.formats.appearance.folding import mean_of
-from scenes.formats.appearance.mixtures import NOTHING, is_nothing
+from scenes.formats.appearance.mixtures import BLACK, NOTHING, is_nothing
 from scenes.formats.appearance.spectra import grey
 from scenes.formats.geometry import revolution
 from scenes.formats.geometry.mesh_files import obj_materials, obj_part, read_obj, read_serialized
@@ -114,12 +115,19 @@ class MitsubaShapes:
             shape, local = made
             if isinstance(shape, Curves):
                 shape, keys = sized(shape, keys)
-            if properties.truth("flipNormals", False):
-                shape = turned(as_mesh(shape))
-            place = product(keys[0], local)
+            turn_over, place = properties.truth("flipNormals", False), product(keys[0], local)
             inside, outside = sides
-            if self.modern and kind not in _FLAT and determinant(place) < 0.0:
-                inside, outside = outside, inside  # as measured with Mitsuba 3.9
+            if self.modern and kind not in _FLAT and determinant(place) < 0.0:  # as measured with Mitsuba 3.9
+                has_sides = turn_over or emission is not None or one_sided or isinstance(material, Glass)
+                if isinstance(shape, Sphere) and has_sides:
+                    turn_over = not turn_over
+                else:
+                    inside, outside = outside, inside
+            if turn_over:
+                if isinstance(shape, Sphere):
+                    became = f"a mesh of {len(as_mesh(shape).faces)} triangles"
+                    self.report.add(properties.where, "a sphere inside out", became)
+                shape = turned(as_mesh(shape))
             made = Instance(shape, material, place, track, node.get("id"), emission, one_sided)
             found.append(dataclasses.replace(made, interior=inside, exterior=outside))
         if found:
@@ -167,8 +175,8 @@ class MitsubaShapes:
     ) -> tuple[dict[str | None, tuple[Material, bool]], Rgb | None]:
         """Materials of a shape, each with whether its back is black, and its emission.
 
-        The key None has the material of all faces without a named one; a shape of Mitsuba 0.5 with only a medium is
-        invisible, one of Mitsuba 3 grey.
+        The key None has the material of all faces without a named one; without any, a lamp is black, a shape of Mitsuba
+        0.5 with only a medium invisible, and others are grey.
         """
         named: dict[str | None, tuple[Material, bool]] = {}
         material, emission, one_sided, default = None, None, True, _DEFAULT
@@ -203,7 +211,7 @@ class MitsubaShapes:
             elif node.tag not in ("texture",):
                 raise SceneError(f"{node.place}: expected a part of a shape, got {node.tag!r}")
         if len(named) < len(used) or not named:
-            named[None] = material or default, one_sided
+            named[None] = material or (BLACK if emission is not None and default is _DEFAULT else default), one_sided
         return named, emission
 
     def _sides(self, properties: Properties) -> tuple[Medium | None, Medium | None]:

@@ -35,6 +35,7 @@ class SceneFiles:
         self.folder = self.main.resolve().parent
         self.root = (Path(root) if root is not None else self.folder).resolve()
         self._left = bytes_max
+        self._paths: dict[tuple[str, Path | None], Path] = {}
         if not self.folder.is_relative_to(self.root):
             raise SceneError(f"{main}: expected a scene inside {self.root}")
 
@@ -49,7 +50,7 @@ class SceneFiles:
         Raises:
             SceneError: the name is absolute, leads outside, or names no file.
         """
-        found = self._found(name, where, beside)
+        found = self._once(name, where, beside)
         if found is None:
             wanted = self.folder / name.replace("\\", "/")
             raise SceneError(f"{where}: expected a file at {wanted}, found none")
@@ -63,9 +64,16 @@ class SceneFiles:
         Raises:
             SceneError: the name is absolute or leads outside.
         """
-        found = self._found(name, where, beside)
+        found = self._once(name, where, beside)
         if found is None:
             report.add(where, f"{what}, which is missing", became)
+        return found
+
+    def _once(self, name: str, where: str, beside: Path | None) -> Path | None:
+        """The file of a name, which is searched until it is found."""
+        found = self._paths.get((name, beside)) or self._found(name, where, beside)
+        if found is not None:
+            self._paths[name, beside] = found
         return found
 
     def _found(self, name: str, where: str, beside: Path | None) -> Path | None:

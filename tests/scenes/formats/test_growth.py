@@ -10,8 +10,9 @@ import numpy as np
 import pytest
 
 from scenes import arithmetic
+from scenes.canonical import ConstantTexture, Instance, Matte, PerspectiveCamera, Scene, Sphere
 from scenes.formats.conversion import load_scene_file, save_scene_file
-from scenes.formats.geometry import transform_stack
+from scenes.formats.geometry import recognition, transform_stack
 from scenes.formats.geometry.orientation import scales_evenly
 from scenes.formats.geometry.transform_stack import TransformStack, rotation, translation
 from scenes.formats.mitsuba import read as mitsuba_read
@@ -79,3 +80,20 @@ def test_a_directive_after_many_lines_has_its_place(tmp_path: Path) -> None:
     )
     with pytest.raises(ValueError, match=r"a\.pbrt:11:3: expected a directive, got 'Strange'"):
         load_scene_file(tmp_path / "a.pbrt")
+
+
+@pytest.mark.parametrize("reverse", ["", "ReverseOrientation\n"])
+def test_a_mesh_file_of_many_shapes_is_recognised_once(
+    reverse: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Spheres are meshes in LuxRender, which are looked at when they are read."""
+    ball = Instance(Sphere(), Matte(ConstantTexture((0.5, 0.5, 0.5))))
+    save_scene_file(Scene(PerspectiveCamera(), (ball,)), tmp_path / "a.lxs")
+    text = (tmp_path / "a.lxs").read_text().replace("\tAttributeBegin\n", f"\tAttributeBegin\n{reverse}")
+    start, end = text.index("\tAttributeBegin"), text.index("WorldEnd")
+    (tmp_path / "a.lxs").write_text(text[:start] + 20 * text[start:end] + text[end:])
+    made = []
+    recognised = recognition.recognised
+    monkeypatch.setattr(recognition, "recognised", lambda mesh: made.append(mesh) or recognised(mesh))
+    read = load_scene_file(tmp_path / "a.lxs")
+    assert len(read.instances) == 20 and 1 <= len(made) <= 2  # with and without its texture coordinates

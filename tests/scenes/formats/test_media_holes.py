@@ -66,11 +66,19 @@ def test_holes_of_files(tmp_path: Path) -> None:
     assert load_scene_file(tmp_path / "a.xml").instances[1].interior == VACUUM
 
 
+@pytest.mark.parametrize("around", [True, False])
 @pytest.mark.parametrize("program", ["mitsuba", "luxcore"])
-def test_light_is_not_absorbed_in_a_hole(program: str, tmp_path: Path) -> None:
-    """Of five units three absorb."""
+def test_light_is_not_absorbed_in_a_hole(program: str, around: bool, tmp_path: Path) -> None:
+    """Of five units three absorb: in a medium around the camera, or in a block."""
+    made = scene(FOG)
+    if not around:
+        stretched = at(-2.49)  # before the wall
+        stretched[2, 2] = 2.5
+        block = Instance(Cube(), NOTHING, stretched, interior=FOG)
+        camera = dataclasses.replace(made.camera, to_world=at(1.0))
+        made = dataclasses.replace(made, camera=camera, instances=(*made.instances, block), medium=None)
     wanted = np.exp(-3.0 * np.array(FOG.absorption))
-    picture = drawn(scene(FOG), program, tmp_path, 16, 256)[7:9, 7:9].mean(axis=(0, 1))
+    picture = drawn(made, program, tmp_path, 16, 256)[7:9, 7:9].mean(axis=(0, 1))
     np.testing.assert_allclose(picture, wanted, rtol=0.05)
 
 

@@ -5,8 +5,10 @@ from __future__ import annotations
 import math
 from pathlib import Path
 
+import numpy as np
 import pytest
 
+from analysis.conversion.peers import rendered
 from scenes.canonical import ConstantTexture, Matte
 from scenes.formats.conversion import load_scene_file
 from scenes.formats.losses import LossReport
@@ -51,3 +53,24 @@ def test_materials_and_objects_in_files_of_their_own(tmp_path: Path) -> None:
     report = LossReport()
     (found,) = load_scene_file(tmp_path / "a.lxs", None, report).instances
     assert found.material == Matte(ConstantTexture((0.8, 0.1, 0.1))) and not report.losses
+
+
+@pytest.mark.parametrize(("width", "height"), [(64, 32), (32, 64)])
+def test_an_angle_without_a_window_is_that_of_the_shorter_side(width: int, height: int, tmp_path: Path) -> None:
+    """A square of half the width that the angle covers: LuxCore has the angle along the longer side."""
+    film = f'Film "fleximage" "integer xresolution" [{width}] "integer yresolution" [{height}]\n'
+    shape = '"integer indices" [0 1 2 0 2 3] "point P" [-1 -1 -2 1 -1 -2 1 1 -2 -1 1 -2]\n'
+    lamp = f'AreaLightSource "area" "float power" [0] "float efficacy" [0]\nShape "trianglemesh" {shape}'
+    wide, high = width / min(width, height), height / min(width, height)
+    for window, side_px in (("", 32), (f'"float screenwindow" [{-wide} {wide} {-high} {high}]', 16)):
+        camera = f'LookAt 0 0 0 0 0 -1 0 1 0\nCamera "perspective" "float fov" [90] {window}\n'
+        file, report = tmp_path / f"{side_px}.lxs", LossReport()
+        file.write_text(f"{film}{camera}WorldBegin\n{lamp}WorldEnd\n")
+        pytest.importorskip("pyluxcore")
+        picture = rendered("luxcore", file, tmp_path / "a.npy", (width, height), 16, 300.0)
+        assert not isinstance(picture, str) and np.ptp(np.nonzero(picture[height // 2, :, 0] > 0.5)) + 1 == side_px
+        scene = load_scene_file(file, None, report)
+        assert scene.camera.fov_deg == pytest.approx(90.0)  # type: ignore[union-attr]
+        assert [loss.what for loss in report.losses if loss.picture] == (
+            [] if window else ["an angle of view without screenwindow, which LuxCore has along the longer side"]
+        )
