@@ -117,7 +117,7 @@ class MitsubaShapes:
                 shape, keys = sized(shape, keys)
             turn_over, place = properties.truth("flipNormals", False), product(keys[0], local)
             inside, outside = sides
-            if self.modern and kind not in _FLAT and determinant(place) < 0.0:  # as measured with Mitsuba 3.9
+            if self.modern and kind not in _FLAT and determinant(keys[0]) < 0.0:  # as measured with Mitsuba 3.9
                 has_sides = turn_over or emission is not None or one_sided or isinstance(material, Glass)
                 if isinstance(shape, Sphere) and has_sides:
                     turn_over = not turn_over
