@@ -59,7 +59,7 @@ from scenes.formats.appearance.media import without_media
 from scenes.formats.appearance.simpler import simpler
 from scenes.formats.appearance.spectra import rgb
 from scenes.formats.appearance.spot_profiles import reshaped
-from scenes.formats.geometry.meshed import as_mesh, cube_sides, depends_on_uv
+from scenes.formats.geometry.meshed import as_mesh, cube_sides, depends_on_uv, of_radius_one
 from scenes.formats.geometry.placing import lose_back, lose_shine_behind
 from scenes.formats.losses import LossReport
 from scenes.models.phong_of_parts import EXPONENT_MAX
@@ -139,7 +139,8 @@ class Approximation:
             made = dataclasses.replace(made, shape=mesh)
         if instance.emission is None:
             if isinstance(instance.shape, Cube | Disk) and depends_on_uv(made.material):
-                return [dataclasses.replace(made, shape=as_mesh(instance.shape))]
+                made = of_radius_one(made)
+                return [dataclasses.replace(made, shape=as_mesh(made.shape))]
             return [made]
         if isinstance(instance.shape, Rectangle | Sphere):
             return [made]

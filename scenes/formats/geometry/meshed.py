@@ -94,7 +94,17 @@ def turned_over(instance: Instance) -> Instance:
     """The instance with its inside out; a rectangle without texture stays a rectangle, rotated about its y axis."""
     if isinstance(instance.shape, Rectangle) and not depends_on_uv(instance.material):
         return dataclasses.replace(instance, to_world=product(instance.to_world, np.diag([-1.0, 1.0, -1.0, 1.0])))
+    instance = of_radius_one(instance)
     return dataclasses.replace(instance, shape=turned(as_mesh(instance.shape)))
+
+
+def of_radius_one(instance: Instance) -> Instance:
+    """The instance with a sphere or disk of radius 1, which its placement scales: the mesh of all sizes is shared."""
+    shape = instance.shape
+    if not isinstance(shape, Disk | Sphere) or shape.radius == 1.0:
+        return instance
+    scale = np.array([shape.radius, shape.radius, shape.radius, 1.0])
+    return dataclasses.replace(instance, shape=type(shape)(), to_world=instance.to_world * scale)
 
 
 def as_mesh(shape: Shape) -> Mesh:

@@ -18,8 +18,9 @@ def area_normals(corners: np.ndarray) -> np.ndarray:
     return np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
 
 
+@lru_cache(maxsize=8)
 def turned(mesh: Mesh) -> Mesh:
-    """The mesh with its inside out."""
+    """The mesh with its inside out; the same one for a mesh that many shapes share."""
     normals = None if mesh.normals is None else -mesh.normals
     return Mesh(mesh.vertices, mesh.faces[:, ::-1].copy(), normals, mesh.uvs, mesh.source)
 
@@ -66,9 +67,11 @@ def _dot(a: list[float], b: list[float]) -> float:
 
 def upright(mesh: Mesh, matrix: np.ndarray) -> tuple[Mesh, np.ndarray]:
     """A mesh and its transform; if the transform is a reflection, the mesh is reflected instead."""
-    if determinant(matrix) > 0.0:
-        return mesh, matrix
+    return (mesh, matrix) if determinant(matrix) > 0.0 else (_reflected(mesh), product(matrix, FLIPPED))
+
+
+@lru_cache(maxsize=8)
+def _reflected(mesh: Mesh) -> Mesh:
     away = np.array([1.0, 1.0, -1.0], np.float32)
     normals = None if mesh.normals is None else mesh.normals * away
-    mirrored = Mesh(mesh.vertices * away, mesh.faces[:, ::-1].copy(), normals, mesh.uvs, mesh.source)
-    return mirrored, product(matrix, FLIPPED)
+    return Mesh(mesh.vertices * away, mesh.faces[:, ::-1].copy(), normals, mesh.uvs, mesh.source)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -94,14 +95,15 @@ def partial_sphere(radius: float, z_min: float, z_max: float, turn_deg: float = 
     return revolved(profile, 2 * ALONG, turn_deg, "sphere")
 
 
-def lamp_sphere(radius: float) -> Mesh:
-    """A sphere of 224 triangles with the area of the exact one; LuxCore samples the light of at most 256 triangles."""
+@lru_cache(maxsize=1)
+def lamp_sphere() -> Mesh:
+    """224 triangles with the area of a sphere of radius 1; LuxCore samples the light of at most 256 triangles."""
 
     def profile(v: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         return sin(math.pi * v), -cos(math.pi * v)
 
     unit = revolved(profile, 8, source="sphere", full=16)
-    scale = radius * math.sqrt(4.0 * math.pi / area(unit))
+    scale = math.sqrt(4.0 * math.pi / area(unit))
     return Mesh((unit.vertices * np.float32(scale)), unit.faces, unit.normals, unit.uvs, unit.source)
 
 

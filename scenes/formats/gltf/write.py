@@ -42,7 +42,14 @@ from scenes.formats.appearance.media import absorbing_within
 from scenes.formats.appearance.spot_profiles import reshaped
 from scenes.formats.geometry.bodies import Body, bodies_of
 from scenes.formats.geometry.conventions import FAR
-from scenes.formats.geometry.meshed import about_middle, as_mesh, depends_on_uv, rectangle_mesh, shape_name
+from scenes.formats.geometry.meshed import (
+    about_middle,
+    as_mesh,
+    depends_on_uv,
+    of_radius_one,
+    rectangle_mesh,
+    shape_name,
+)
 from scenes.formats.geometry.placing import facing, has_two_sides, keys_from_zero, lose_undrawn_back, shines
 from scenes.formats.gltf.document import INDICES, VERTICES, Document, Json
 from scenes.formats.gltf.write_materials import GltfMaterialWriter, Look
@@ -75,7 +82,7 @@ class GltfWriter:
         scene = absorbing_within(scene, self.report)
         self._camera(scene.camera, scene.film)
         number = 0
-        for body in bodies_of(scene.instances, lambda first, second: True):
+        for body in bodies_of(map(of_radius_one, scene.instances), lambda first, second: True):
             name = body[0].name.rpartition("/")[2] or f"{type(body[0].shape).__name__}{number}"
             self._body(body, name)
             number += len(body)

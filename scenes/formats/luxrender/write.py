@@ -37,7 +37,7 @@ from scenes.formats.appearance.spot_profiles import reshaped
 from scenes.formats.directives.scene_reader import FILTERS
 from scenes.formats.directives.scene_writer import SceneWriter, quoted
 from scenes.formats.geometry.conventions import FAR, MAP_AXES
-from scenes.formats.geometry.meshed import as_mesh
+from scenes.formats.geometry.meshed import as_mesh, of_radius_one
 from scenes.formats.geometry.orientation import upright
 from scenes.formats.geometry.placing import (
     borders_media,
@@ -186,6 +186,7 @@ class LuxWriter(LuxSurfaceWriter, SceneWriter):
     def write_instance(self, instance: Instance) -> None:
         """Writes a shape with its placement. LuxCore supports objects only for mesh files, and shows the last key of a
         motion."""
+        instance = of_radius_one(instance)
         mirrored = determinant(instance.to_world) < 0.0
         if mirrored and (isinstance(instance.shape, Sphere) or has_outside(instance)):
             mesh, matrix = upright(self._meshed(instance), instance.to_world)
@@ -236,7 +237,7 @@ class LuxWriter(LuxSurfaceWriter, SceneWriter):
     def _meshed(self, instance: Instance) -> Mesh:
         """A shape as triangles, because LuxCore ignores spheres and disks."""
         shape = instance.shape
-        mesh = lamp_sphere(shape.radius) if isinstance(shape, Sphere) and shines(instance) else as_mesh(shape)
+        mesh = lamp_sphere() if isinstance(shape, Sphere) and shines(instance) else as_mesh(shape)
         if mesh is not shape and not isinstance(shape, Rectangle | Cube):
             what = f"shape {type(shape).__name__.lower()}"
             self.report.add(instance.name or "shape", what, f"a mesh of {len(mesh.faces)} triangles")

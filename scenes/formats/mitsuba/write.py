@@ -29,7 +29,7 @@ from scenes.canonical import (
 from scenes.canonical.values import Matrix
 from scenes.formats.appearance.mixtures import direct_if_same, lets_through
 from scenes.formats.geometry.conventions import FAR
-from scenes.formats.geometry.meshed import as_mesh, depends_on_uv
+from scenes.formats.geometry.meshed import as_mesh, depends_on_uv, of_radius_one
 from scenes.formats.geometry.orientation import FLIPPED, scales_evenly, upright
 from scenes.formats.geometry.placing import (
     PartKey,
@@ -179,6 +179,8 @@ class MitsubaWriter(MitsubaCurveWriter):
     def _instance(self, instance: Instance) -> None:
         """Writes a shape with its placement; shared and moving shapes are instances of a group, because only these may
         move."""
+        if self._as_triangles(instance):
+            instance = of_radius_one(instance)
         keys, times_s = motion_keys(instance.track, instance.to_world)
         where, shared = instance.name or "shape", part_key(instance) in self.shared
         mirrored = determinant(instance.to_world) < 0.0

@@ -37,7 +37,7 @@ from scenes.canonical.values import Matrix, RigidTrack
 from scenes.formats.appearance.media import without_media
 from scenes.formats.geometry.bodies import Body, bodies_of, joined
 from scenes.formats.geometry.conventions import aspect_of
-from scenes.formats.geometry.meshed import as_mesh, depends_on_uv, rectangle_mesh, shape_name
+from scenes.formats.geometry.meshed import as_mesh, depends_on_uv, of_radius_one, rectangle_mesh, shape_name
 from scenes.formats.geometry.placing import has_two_sides, keys_from_zero, lose_undrawn_back, shines
 from scenes.formats.losses import LossReport, without_settings
 from scenes.formats.text.output import Output
@@ -69,7 +69,7 @@ class UsdWriter:
         if determinant(scene.camera.to_world) < 0.0:
             self.document.place(UsdGeom.Xform.Get(self.stage, ROOT), np.diag([-1.0, 1.0, 1.0, 1.0]))
         self._camera(scene.camera, scene.film)
-        bodies = list(bodies_of(scene.instances, _alike))
+        bodies = list(bodies_of(map(_sized, scene.instances), _alike))
         keys = list(map(_shared_key, bodies))
         self._counts = Counter(keys)
         number = 0
@@ -208,6 +208,13 @@ class UsdWriter:
             UsdLux.LightAPI.Apply(prim)
         strengthen(prim, (1.0, 1.0, 1.0))
         UsdLux.LightAPI(prim).CreateMaterialSyncModeAttr("materialGlowTintsLight")
+
+
+def _sized(instance: Instance) -> Instance:
+    """The instance; one that becomes a mesh has the radius 1."""
+    shape = instance.shape
+    meshed = isinstance(shape, Disk) or (isinstance(shape, Sphere) and depends_on_uv(instance.material))
+    return of_radius_one(instance) if meshed and not is_lamp_alone(instance) else instance
 
 
 def _alike(first: Instance, second: Instance) -> bool:

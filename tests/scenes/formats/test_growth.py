@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import dataclasses
 import gc
+import json
 import xml.etree.ElementTree as ElementTree
 from pathlib import Path
 
@@ -10,10 +12,23 @@ import numpy as np
 import pytest
 
 from scenes import arithmetic
-from scenes.canonical import ConstantTexture, Instance, Matte, PerspectiveCamera, Scene, Sphere
+from scenes.arithmetic import product
+from scenes.canonical import (
+    CheckerboardTexture,
+    ConstantTexture,
+    Disk,
+    Instance,
+    Matte,
+    PerspectiveCamera,
+    RigidTrack,
+    Scene,
+    Sphere,
+)
 from scenes.formats.conversion import load_scene_file, save_scene_file
 from scenes.formats.geometry import recognition, transform_stack
-from scenes.formats.geometry.orientation import scales_evenly
+from scenes.formats.geometry.meshed import as_mesh
+from scenes.formats.geometry.orientation import FLIPPED, scales_evenly
+from scenes.formats.geometry.placing import placed
 from scenes.formats.geometry.transform_stack import TransformStack, rotation, translation
 from scenes.formats.mitsuba import read as mitsuba_read
 from scenes.formats.text.xml_tree import xml_text
@@ -80,6 +95,45 @@ def test_a_directive_after_many_lines_has_its_place(tmp_path: Path) -> None:
     )
     with pytest.raises(ValueError, match=r"a\.pbrt:11:3: expected a directive, got 'Strange'"):
         load_scene_file(tmp_path / "a.pbrt")
+
+
+def _balls(kind: str) -> tuple[Instance, ...]:
+    """Shapes of 20 sizes."""
+    grey = ConstantTexture((0.5, 0.5, 0.5))
+    checks = CheckerboardTexture(grey, ConstantTexture((0.1, 0.1, 0.1)))
+    place = translation(1.0, 2.0, 3.0)
+    one = Instance(Sphere(), Matte(checks if kind.startswith("textured") else grey), place)
+    if kind == "moving":
+        one = dataclasses.replace(one, track=RigidTrack(0.0, 1.0, np.eye(3)[:2], np.tile([0.0, 0.0, 0.0, 1.0], (2, 1))))
+    elif kind == "lamps":
+        one = dataclasses.replace(one, emission=(1.0, 2.0, 3.0))
+    elif kind == "mirrored":
+        one = dataclasses.replace(one, to_world=product(place, FLIPPED))
+    disk = kind.endswith("disks")
+    return tuple(dataclasses.replace(one, shape=(Disk if disk else Sphere)(0.5 + 0.1 * size)) for size in range(20))
+
+
+@pytest.mark.parametrize("kind", ["still", "moving", "lamps", "mirrored", "disks", "textured", "textured disks"])
+@pytest.mark.parametrize("name", ["a.lxs", "a.gltf", "a.usda", "a.xml"])
+def test_shapes_of_all_sizes_share_a_mesh(kind: str, name: str, tmp_path: Path) -> None:
+    balls = _balls(kind)
+    save_scene_file(Scene(PerspectiveCamera(), balls), tmp_path / name)
+    if name == "a.gltf":
+        assert len(json.loads((tmp_path / name).read_text())["meshes"]) == 1
+    elif name == "a.usda":
+        assert (tmp_path / name).read_text().count("point3f[] points") <= 1
+    else:
+        assert len(list(tmp_path.rglob("*.ply"))) <= 1
+    found = load_scene_file(tmp_path / name).instances
+    for wanted, one in zip(balls, found, strict=True):
+        np.testing.assert_allclose(_ends(one), _ends(wanted), atol=0.04)
+
+
+def _ends(instance: Instance) -> np.ndarray:
+    """Corners ``(2, 3)`` of the box about a shape at the start of its motion."""
+    points = product(as_mesh(instance.shape).vertices.astype(np.float64), instance.to_world[:3, :3].T)
+    moved = placed(instance.track, instance.to_world)[:3, 3]
+    return np.stack([points.min(axis=0), points.max(axis=0)]) + moved
 
 
 @pytest.mark.parametrize("reverse", ["", "ReverseOrientation\n"])
