@@ -89,8 +89,6 @@ def curves_of(prim: Any, code: Any, where: str, report: LossReport) -> Curves | 
     if segments is None or not segments.whole:
         report.add(where, f"curves ({basis}, {wrap}) whose numbers do not fit")
         return None
-    if curves.GetPointsAttr().GetNumTimeSamples() > 1:
-        report.add(where, "curves that move", "their places at the start")
     given = finite(array_of(curves.GetWidthsAttr().Get(code), 1), f"{where}: widths")
     widths = _of(given, str(curves.GetWidthsInterpolation()), segments, len(points))
     if widths is None:

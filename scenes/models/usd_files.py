@@ -199,6 +199,10 @@ class _Reader:
 
     def _read(self, prim: Any) -> list[_Part]:
         name, kind = prim.GetName(), prim.GetTypeName()
+        if not prim.IsA(UsdGeom.Mesh) and kind not in (*SHAPES, "BasisCurves"):
+            self.report.add(name, f"a prim of kind {kind}")
+            return []
+        note_animated(prim, self.motion.pose)
         if prim.HasAPI(UsdLux.LightAPI) and not glow_of(prim, self.code, self.report):
             self.report.add(name, "the light of a mesh", "a surface that does not shine")
         opacity = UsdGeom.PrimvarsAPI(prim).FindPrimvarWithInheritance("displayOpacity")
@@ -208,14 +212,11 @@ class _Reader:
             return self._mesh(UsdGeom.Mesh(prim), name)
         if kind == "BasisCurves":
             curves = curves_of(prim, self.code, name, self.report)
-            shapes = [] if curves is None else [(curves, np.eye(4))]
-        elif kind in SHAPES:
-            shapes = shapes_of(prim, self.code)
+            if curves is None:
+                return []
+            shapes = [(curves, np.eye(4))]
         else:
-            self.report.add(name, f"a prim of kind {kind}")
-            shapes = []
-        if not shapes:
-            return []
+            shapes = shapes_of(prim, self.code)
         number, colors = self.described.number(self._bound(prim), bool(UsdGeom.Gprim(prim).GetDoubleSidedAttr().Get()))
         if self.described.coordinates(number):
             self.report.add(name, f"textures of a {kind.lower()}, which has no texture coordinates")
@@ -230,13 +231,12 @@ class _Reader:
 
     def _mesh(self, mesh: Any, name: str) -> list[_Part]:
         """The parts of a mesh, one for each material."""
-        if mesh.GetPointsAttr().GetNumTimeSamples() > 1:
-            self.motion.pose.add(name, "vertices that move", "their places")
         whole = triangles_of(mesh, self.code, name, self.report)
         if whole is None:
             return []
         rest, found = np.ones(whole.polygons, bool), []
         for prim, marks in subsets_of(mesh, self.code, whole.polygons, self.report):
+            note_animated(prim, self.motion.pose)
             found.append((prim, marks & rest))
             rest &= ~marks
         found.append((mesh.GetPrim(), rest))

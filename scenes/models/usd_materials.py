@@ -84,7 +84,6 @@ class UsdMaterials:
         if kind != "UsdPreviewSurface":
             self.report.add(where, f"a surface of kind {kind or 'none'}", "the displayed colour")
             return None
-        note_animated(shader.GetPrim(), self.pose)
         given = {name: self._value(shader, name, rest, where) for name, rest in {**_NUMBERS, **_COLORS}.items()}
         for name, value in given.items():
             if isinstance(value, Reading) and name not in _TEXTURED:
@@ -213,6 +212,7 @@ class UsdMaterials:
         given = shader.GetInput(name)
         for attribute in UsdShade.Utils.GetValueProducingAttributes(given) if given else ():
             if not UsdShade.Output.IsOutput(attribute):
+                note_animated(attribute.GetPrim(), self.pose)
                 found = attribute.Get(self.code)
                 return None if isinstance(found, Sdf.AssetPath) else finite(found, attribute.GetPath())
         return None
@@ -250,6 +250,7 @@ class UsdMaterials:
         """The resolved path of the picture of a UsdUVTexture; None if it is missing and the file has a fallback."""
         given = shader.GetInput("file")
         for attribute in UsdShade.Utils.GetValueProducingAttributes(given) if given else ():
+            note_animated(attribute.GetPrim(), self.pose)
             found = attribute.Get(self.code)
             if isinstance(found, Sdf.AssetPath):
                 path = found.resolvedPath

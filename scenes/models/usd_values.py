@@ -37,8 +37,9 @@ def array_of(values: Any, width: int) -> NDArray[np.float64]:
 
 
 def note_animated(prim: Any, pose: Pose) -> None:
-    """Notes values of a prim that change over time, beside its transform and visibility, which are read otherwise."""
+    """Notes values of a prim that change over time, beside its transform and visibility, which are read otherwise, and
+    its box, which is not read."""
     names = (one.GetName() for one in prim.GetAttributes() if one.ValueMightBeTimeVarying())
-    changing = sorted(name for name in names if not name.startswith("xformOp") and name != "visibility")
+    changing = sorted(name for name in names if not name.startswith("xformOp") and name not in ("visibility", "extent"))
     if changing:
         pose.add(prim.GetName(), f"values that change ({', '.join(changing)})", "those")

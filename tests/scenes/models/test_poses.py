@@ -16,7 +16,6 @@ from scenes.models import Model, read_whole
 from tests.scenes.models.files import QUAD, Gltf
 from tests.scenes.models.test_gltf_motion import animated, where
 from tests.scenes.models.test_gltf_views import with_skin
-from tests.scenes.models.usd import written
 
 TIMES_S = (0.0, 0.3, 0.5, 0.8, 1.0, 5.0)
 
@@ -177,89 +176,3 @@ def test_the_camera_of_a_model_does_not_follow_its_pose(tmp_path: Path) -> None:
     one, other = (render(path, 32, time_s) for time_s in (0.0, 1.0))
     assert np.abs(one - other).max() > 0.1
     np.testing.assert_array_equal(one, render(path, 32, 0.0))
-
-
-SKELETON = """
-def SkelRoot "Root" {
-    def Skeleton "Bones" (
-        prepend apiSchemas = ["SkelBindingAPI"]
-    ) {
-        uniform token[] joints = ["a", "a/b"]
-        uniform matrix4d[] bindTransforms = [
-            ((1, 0, 0, 0), (0, 1, 0, 0), (0, 0, 1, 0), (0, 0, 0, 1)),
-            ((1, 0, 0, 0), (0, 1, 0, 0), (0, 0, 1, 0), (1, 0, 0, 1))]
-        uniform matrix4d[] restTransforms = [
-            ((1, 0, 0, 0), (0, 1, 0, 0), (0, 0, 1, 0), (0, 0, 0, 1)),
-            ((1, 0, 0, 0), (0, 1, 0, 0), (0, 0, 1, 0), (1, 0, 0, 1))]
-        rel skel:animationSource = </Root/Anim>
-    }
-    def SkelAnimation "Anim" {
-        uniform token[] joints = ["a", "a/b"]
-        float3[] translations = [(0, 0, 0), (1, 0, 0)]
-        quatf[] rotations.timeSamples = {
-            0: [(1, 0, 0, 0), (1, 0, 0, 0)],
-            24: [(1, 0, 0, 0), (0.70710678, 0, 0.70710678, 0)]
-        }
-        half3[] scales = [(1, 1, 1), (1, 1, 1)]
-    }
-    def Mesh "skinned" (
-        prepend apiSchemas = ["SkelBindingAPI"]
-    ) {
-        int[] faceVertexCounts = [4]
-        int[] faceVertexIndices = [0, 1, 2, 3]
-        point3f[] points = [(-1, -1, 0), (1, -1, 0), (1, 1, 0), (-1, 1, 0)]
-        uniform token subdivisionScheme = "none"
-        int[] primvars:skel:jointIndices = [0, 1, 1, 1] (
-            elementSize = 1
-            interpolation = "vertex"
-        )
-        float[] primvars:skel:jointWeights = [1, 1, 1, 1] (
-            elementSize = 1
-            interpolation = "vertex"
-        )
-        rel skel:skeleton = </Root/Bones>
-    }
-}
-"""
-
-
-def test_a_skeleton_of_usd_has_its_pose_at_a_time(tmp_path: Path) -> None:
-    pytest.importorskip("pxr")
-    path = tmp_path / "in.usda"
-    written(tmp_path, "", end=24)
-    path.write_text(path.read_text() + SKELETON)
-    for time_s in (0.0, 0.25, 0.5, 1.0, 3.0):
-        report = LossReport()
-        model = read_whole(path, report, time_s=time_s)
-        angle = min(time_s, 1.0) * math.pi / 2
-        expected = [np.array(QUAD[0]), *(turned(angle, QUAD[number]) for number in (1, 2, 3))]
-        same_points(model, np.array(expected), 1e-5)
-        assert model.posed and f"a skeleton that moves: the pose at {time_s:g} s" in report.text()
-
-
-def test_values_of_usd_are_those_at_the_time(tmp_path: Path) -> None:
-    pytest.importorskip("pxr")
-    body = """def Mesh "quad" {
-        int[] faceVertexCounts = [4]
-        int[] faceVertexIndices = [0, 1, 2, 3]
-        point3f[] points.timeSamples = {
-            0: [(-1, -1, 0), (1, -1, 0), (1, 1, 0), (-1, 1, 0)],
-            24: [(-1, -1, 8), (1, -1, 8), (1, 1, 8), (-1, 1, 8)]
-        }
-        uniform token subdivisionScheme = "none"
-}
-def SphereLight "lamp" {
-        float inputs:intensity.timeSamples = { 0: 1, 24: 3 }
-        double3 xformOp:translate.timeSamples = { 0: (0, 0, 0), 24: (4, 0, 0) }
-        uniform token[] xformOpOrder = ["xformOp:translate"]
-}
-"""
-    path = tmp_path / "in.usda"
-    written(tmp_path, "", end=24)
-    path.write_text(path.read_text() + body)
-    first, later = (read_whole(path, time_s=time_s) for time_s in (0.0, 0.5))
-    (mesh, lamp), (mesh_later, lamp_later) = first.parts, later.parts
-    assert (mesh.shape.vertices[:, 2] == 0.0).all() and (mesh_later.shape.vertices[:, 2] == 4.0).all()
-    np.testing.assert_allclose(np.divide(lamp_later.emission, lamp.emission), 2.0)
-    assert lamp.track is not None and lamp_later.track is not None, "rigid motion stays a motion"
-    np.testing.assert_array_equal(lamp.to_world, lamp_later.to_world)
