@@ -56,7 +56,11 @@ def read_trials(paths: Sequence[Path]) -> tuple[pd.DataFrame, str]:
 
 def _csv(content: bytes) -> pd.DataFrame:
     """A table whose separator is that of its first line; numbers with commas go with semicolons, as spreadsheets write
-    them."""
+    them.
+
+    Raises:
+        ValueError: it is no table, or two of its columns differ in case and blanks alone.
+    """
     wide = content[:2] in (codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)
     try:
         text = content.decode("utf-16" if wide else "utf-8-sig")
@@ -66,7 +70,10 @@ def _csv(content: bytes) -> pd.DataFrame:
     between = max(",;\t", key=head.count)
     decimal = "," if between == ";" else "."
     table = pd.read_csv(io.StringIO(text), sep=between, decimal=decimal, skipinitialspace=True)
-    return table.rename(columns=lambda name: str(name).strip().lower())
+    table = table.rename(columns=lambda name: str(name).strip().lower())
+    if not table.columns.is_unique:
+        raise ValueError(f"two columns {table.columns[table.columns.duplicated()][0]}")
+    return table
 
 
 def undisturbed(trials: pd.DataFrame) -> pd.DataFrame:

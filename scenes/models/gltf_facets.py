@@ -136,9 +136,13 @@ class FacetMaterials:
             share *= float(self.textures.picture(lookup, numbers=True)[..., 0].mean(dtype=np.float64))
         metallic, roughness = solid.metallic, solid.roughness
         if solid.parts is not None:
-            self.report.add(where, "a texture of the roughness of glass", "its mean")
             _, green, blue = mean_of(solid.parts)
             metallic, roughness = metallic * min(blue, 1.0), roughness * min(green, 1.0)
+        share *= 1.0 - metallic
+        if share <= 0.0:
+            return solid
+        if solid.parts is not None:
+            self.report.add(where, "a texture of the roughness of glass", "its mean")
         if max(solid.emission) > 0.0:
             self.report.add(where, "light of a surface that lets light through")
         thin = not extensions.get("KHR_materials_volume", {}).get("thicknessFactor", 0.0) > 0.0
@@ -148,12 +152,9 @@ class FacetMaterials:
             self.report.add(where, "a clear coat on glass")
         alpha = 0.0 if thin else roughness**2
         glass = Glass(transmittance=solid.base, ior=solid.ior, roughness=(alpha, alpha), thin=thin)
-        share *= 1.0 - metallic
         if share >= 1.0:
             unseen = glass == Glass(ior=1.0) and self.medium(given, where) is not None
             return NOTHING if unseen else glass
-        if share <= 0.0:
-            return solid
         rest = MetallicRough(solid.base, metallic / (1.0 - share), roughness, ior=solid.ior)
         return MixMaterial(rest, glass, ConstantTexture(grey(share)))
 

@@ -114,13 +114,14 @@ class _Reader:
         if number in self._world:
             raise misplaced(f"nodes[{number}]", "a tree of nodes", f"node {number} twice")
         name = node.get("name", f"node{number}")
-        now = product(now, self.motion.poses(number, np.array([self.pose.time_s]))[0])
+        local = self.motion.poses(number, np.array([self.pose.time_s]))[0]
+        now = product(now, local)
         if self.motion.moves(number):
             moved = self.motion.poses(number, self.motion.times_s)
             above, frame, moving = product(above, product(frame, moved)), np.eye(4), True
             track = rigid_track(above, self.motion.times_s, name, self.pose)
         else:
-            frame = product(frame, self.motion.poses(number, np.zeros(1))[0])
+            frame = product(frame, local)
         matrix = now if moving and track is None else product(above[0], frame)
         if not all(np.isfinite(one).all() for one in (above, matrix, now)):
             raise misplaced(f"nodes[{number}]", "a finite transform to the world", "one that overflows")

@@ -46,6 +46,7 @@ _FIXED = {"-blendu": 1, "-blendv": 1, "-cc": 1, "-clamp": 1, "-mm": 2, "-texres"
 _VECTORS = ("-o", "-s", "-t")
 _MAPS = ("map_", "bump", "disp", "decal", "refl", "norm")
 _ALONG_PATHS = ("map_d", "norm")
+_CHANNELS = ("r", "g", "b", "m", "l")  # red, green, blue, alpha, brightness
 _UNUSED = ("map_ka", "map_aat")  # ambient light, and anti-aliasing of pictures
 
 
@@ -202,15 +203,27 @@ def _along_paths(
     if "map_d" in entry.lines:
         found = map_of(entry.lines["map_d"])
         path = sources.require(found.name, "a texture at")
-        channel = "".join(found.options.get("-imfchan", ()))
-        values = np.ones((1, 1, 3), np.float32) if channel == "l" else np.repeat(read_alpha(path)[..., None], 3, axis=2)
-        if channel != "m" and (values == 1.0).all():
-            values = np.repeat(read_values(path).mean(axis=2, keepdims=True), 3, axis=2)
-        holes = _texture(found, values * np.float32(opacity), path, where, report, frozenset({"-imfchan"}))
-        return Masked(material, holes)
+        channel = found.options.get("-imfchan", ("",))[0].lower()
+        values = np.repeat(_channel(channel, path)[..., None], 3, axis=2) * np.float32(opacity)
+        read = frozenset({"-imfchan"} if channel in _CHANNELS else ())
+        return Masked(material, _texture(found, values, path, where, report, read))
     if opacity < 1.0 and not isinstance(material, Glass):
         return Masked(material, ConstantTexture(rgb(np.full(3, opacity))))
     return material
+
+
+def _channel(name: str, path: Path) -> Pixels:
+    """A channel ``(h, w)`` of an image by its name in ``_CHANNELS``; by another one alpha, or the brightness where that
+    is 1 everywhere.
+
+    Raises:
+        SceneError: the image cannot be read.
+    """
+    values = read_values(path)
+    if name in ("r", "g", "b"):
+        return values[..., _CHANNELS.index(name)]
+    alpha = np.ones((1, 1), np.float32) if name == "l" else read_alpha(path)
+    return values.mean(axis=2) if name != "m" and (alpha == 1.0).all() else alpha
 
 
 def _reflecting(entry: _Entry, texture: Texture, where: str, report: LossReport) -> Material:

@@ -146,3 +146,10 @@ def test_csv_as_spreadsheets_write_it(encoding: str, between: str, tmp_path: Pat
     path.write_bytes("\r\n".join(between.join(row) for row in rows).encode(encoding))
     trials, _ = read_trials([path])
     assert trials[["observer", "samples", "correct"]].to_numpy().tolist() == [["é", 8, True]]
+
+
+def test_columns_that_differ_in_case_alone_are_refused(tmp_path: Path) -> None:
+    path = tmp_path / "a.csv"
+    path.write_text("observer,samples,Samples,correct\na,8,16,yes\n")
+    with pytest.raises(InputError, match=r"a\.csv: cannot be read as CSV \(two columns samples\)"):
+        read_trials([path])

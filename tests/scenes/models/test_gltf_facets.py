@@ -101,6 +101,17 @@ def test_blended_colours_and_rough_glass(tmp_path: Path) -> None:
     assert isinstance(part.material, Glass) and part.material.roughness == (0.25, 0.25) and not part.material.thin
 
 
+def test_a_metal_that_lets_nothing_through_loses_nothing(tmp_path: Path) -> None:
+    metal, report = {"emissiveFactor": [1, 0, 0], "pbrMetallicRoughness": {"roughnessFactor": 0.5}}, LossReport()
+    (tmp_path / "through").mkdir()
+    through = quad(
+        tmp_path / "through", extensions={"KHR_materials_transmission": {"transmissionFactor": 1.0}}, **metal
+    )
+    (part,) = read_model(through.written(), report, facets=True)
+    (expected,) = read_model(quad(tmp_path, **metal).written(), facets=True)
+    assert part.material == expected.material and not report.losses
+
+
 def test_the_opacity_of_vertices_counts_where_the_material_has_one(tmp_path: Path) -> None:
     colors = np.array([[1, 0, 0, 1], [0, 1, 0, 0.25], [0, 0, 1, 0.25], [1, 1, 1, 0.5]], np.float32)
     for mode, cutoff in (("BLEND", None), ("MASK", 0.5)):

@@ -203,7 +203,8 @@ def test_opacity_and_normal_maps_along_paths(tmp_path: Path) -> None:
     Image.new("RGB", (2, 2), (255, 128, 128)).save(tmp_path / "bent.png")
     Image.new("RGB", (2, 2), (255, 128, 128)).save(tmp_path / "kd.png")
     for line, opacity in (("d 0.5", 0.5), ("map_d alpha.png", 0.2), ("map_d grey.png", 0.4),
-                          ("map_d -imfchan l alpha.png", 1.0), ("d 0.5\nmap_d grey.png", 0.2)):  # fmt: skip
+                          ("map_d -imfchan l alpha.png", 1.0), ("map_d -imfchan m grey.png", 1.0),
+                          ("map_d -imfchan g bent.png", 128 / 255), ("d 0.5\nmap_d grey.png", 0.2)):  # fmt: skip
         report = LossReport()
         (part,) = read_model(model(tmp_path, f"newmtl a\nmap_Kd kd.png\n{line}\n"), report, facets=True)
         assert isinstance(part.material, Masked) and isinstance(part.material.base, Phong) and not report.losses
@@ -211,6 +212,12 @@ def test_opacity_and_normal_maps_along_paths(tmp_path: Path) -> None:
     (part,) = read_model(model(tmp_path, "newmtl a\nnorm -bm 0.5 bent.png\n"), facets=True)
     assert isinstance(part.material, NormalMapped) and part.material.scale == 0.5
     assert mean_of(part.material.normals) == pytest.approx((1.0, 128 / 255, 128 / 255)), "numbers, not colours"
+    (tmp_path / "broken.png").write_bytes(b"no picture")
+    with pytest.raises(SceneError, match="broken.png: cannot be read"):
+        read_model(model(tmp_path, "newmtl a\nmap_d -imfchan m broken.png\n"), facets=True)
+    report = LossReport()
+    read_model(model(tmp_path, "newmtl a\nmap_d -imfchan z grey.png\n"), report, facets=True)
+    assert "the option -imfchan of grey.png" in report.text()
     # the pane stops half of the light
     look = Look(camera=(0, 0, 5, 0, 0, 0), integrator="path", fov_deg=10.0)
     path = model(tmp_path, "newmtl a\nKd 0 0 0\nd 0.5\n")
