@@ -88,8 +88,7 @@ def read_values(path: Path) -> Pixels:
         found = decoded(path)
     except Exception as error:  # decoders raise arbitrary exceptions on broken files
         raise SceneError(f"texture {path}: cannot be read: {one_line(error)}") from error
-    most = 1.0 if found.dtype == np.float32 else np.iinfo(found.dtype).max  # type: ignore[type-var]
-    values = found.astype(np.float32) / np.float32(most)
+    values = fractions(found)
     if not np.isfinite(values).all():
         raise SceneError(f"texture {path}: expected finite values")
     return values
@@ -131,6 +130,13 @@ def _clamped(pixels: Pixels, path: Path) -> Pixels:
     count = int(infinite.any(axis=-1).sum())
     warnings.warn(f"texture {path}: {count} pixels of infinite radiance became {RADIANCE_MOST:g}", stacklevel=4)
     return np.where(infinite, np.float32(RADIANCE_MOST), pixels)
+
+
+def fractions(image: Pixels | NDArray[np.uint8] | NDArray[np.uint16]) -> Pixels:
+    """The values of an image, integers as fractions of the greatest one of their type."""
+    if image.dtype == np.float32:
+        return cast(Pixels, image)
+    return image.astype(np.float32) / np.float32(np.iinfo(cast(NDArray[np.uint8], image).dtype).max)
 
 
 def decode_srgb(encoded: NDArray[np.uint8] | NDArray[np.uint16]) -> NDArray[np.float32]:

@@ -56,7 +56,8 @@ def read_model(path: Path, report: LossReport | None = None, facets: bool = Fals
     Args:
         path: OBJ, PLY, STL, GLB, glTF or USD.
         report: receives the losses.
-        facets: whether materials of glTF and USD are converted for path tracing (:mod:`scenes.models.gltf_facets`).
+        facets: whether materials of glTF, USD and OBJ are converted for path tracing (:mod:`scenes.models.gltf_facets`,
+            :mod:`scenes.models.mtl_files`).
 
     Returns:
         Instances whose transforms are those of the file's nodes.

@@ -20,7 +20,7 @@ from PIL import UnidentifiedImageError
 from scenes.arithmetic import cos, sin
 from scenes.canonical import ImageTexture
 from scenes.formats.losses import LossReport
-from scenes.loading import decode_srgb, one_line
+from scenes.loading import decode_srgb, fractions, one_line
 from scenes.models.gltf_data import GltfData
 from scenes.models.json_records import misplaced
 from scenes.models.sources import Sources
@@ -143,10 +143,8 @@ class GltfTextures(Textures):
         key = (source, numbers)
         if key not in self._pictures:
             found = self._decoded(source, lambda file: decoded(file) if isinstance(file, Path) else by_pillow(file))
-            if found.dtype != np.float32:
-                most = np.iinfo(found.dtype).max  # type: ignore[type-var]
-                found = found.astype(np.float32) / np.float32(most) if numbers else decode_srgb(found)  # type: ignore[arg-type]
-            self._pictures[key] = found.astype(np.float32)
+            linear = numbers or found.dtype == np.float32
+            self._pictures[key] = fractions(found) if linear else decode_srgb(found)  # type: ignore[arg-type]
         return self._pictures[key]
 
     def opacity(self, lookup: Lookup) -> Pixels:

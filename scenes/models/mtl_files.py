@@ -4,8 +4,8 @@
 light is reflected than arrives. By ``illum``, 0 is a constant colour without lighting, 1 has no highlight, 3 and 8 are
 mirrors by ``Ks``, 5 is a mirror that grows at grazing angles, 4 and 9 are thin panes, 6 and 7 are glass of the index
 ``Ni``. ``d`` (or ``1 - Tr``) is the opacity, ``Ke`` the emission. For path tracing ``map_d`` is the opacity, too: the
-alpha of its image, or its brightness where it has none; and ``norm`` is a normal map. ``Pm`` and ``Pr``, if given, are
-the metallic share and the roughness as in glTF.
+alpha of its image, or its brightness where it has none, or the channel of ``-imfchan``; and ``norm`` is a normal map.
+``Pm`` and ``Pr``, if given, are the metallic share and the roughness as in glTF.
 
 Deviation: an image replaces ``Kd`` (the format multiplies them), because exporters leave ``Kd`` at an arbitrary grey.
 

@@ -13,10 +13,9 @@ from scenes.models.usd_library import Usd, UsdGeom
 
 
 class UsdMotion:
-    """The animation of a stage.
+    """The animation of a stage. It starts with the stage, or with the first time sample of a transform.
 
     Attributes:
-        start: time code of the start: that of the stage, or the first time sample of a transform.
         pose: time at which everything is read that does not move rigidly.
         code: its time code.
     """
@@ -28,10 +27,10 @@ class UsdMotion:
         given = stage.HasAuthoredTimeCodeRange()
         first = stage.GetStartTimeCode() if given else min(samples, default=0.0)
         last = stage.GetEndTimeCode() if given else max(samples, default=first)
-        self.start = Usd.TimeCode(first)
+        self._start = first
         self._last_s = (last - first) / self._rate if samples else 0.0
         self.pose, self.code = pose, Usd.TimeCode(first + pose.time_s * self._rate)
-        self._first, self._now = UsdGeom.XformCache(self.start), UsdGeom.XformCache(self.code)
+        self._first, self._now = UsdGeom.XformCache(Usd.TimeCode(first)), UsdGeom.XformCache(self.code)
         self._movers: dict[str, str] = {"/": ""}
         self._tracks: dict[str, RigidTrack] = {}
 
@@ -77,7 +76,7 @@ class UsdMotion:
         world = np.empty((len(paths), len(times_s), 4, 4))
         cache = UsdGeom.XformCache()
         for key, time_s in enumerate(times_s):
-            cache.SetTime(Usd.TimeCode(self.start.GetValue() + time_s * self._rate))
+            cache.SetTime(Usd.TimeCode(self._start + time_s * self._rate))
             for number, prim in enumerate(moving):
                 world[number, key] = _finite(cache.GetLocalToWorldTransform(prim), prim)
         found = {

@@ -16,7 +16,7 @@ from PIL import Image
 
 from scenes.canonical import SceneError
 from scenes.formats.losses import LossReport
-from scenes.loading import decode_srgb, state_of
+from scenes.loading import decode_srgb, fractions, state_of
 from scenes.models.gltf_textures import BORDER, Lookup, Textures
 from scenes.models.sources import Sources
 from scenes.models.usd_library import Ar
@@ -78,15 +78,11 @@ class Pictures:
             given = self._read(path, decoded)
             if given.dtype == np.float32 and space == "sRGB":
                 given = np.rint(np.clip(given, 0.0, 1.0) * 65535.0).astype(np.uint16)
-            if given.dtype == np.float32:
-                found = given
-            elif space == "raw" or (space != "sRGB" and not self._is_encoded(path, given)):
-                found = given.astype(np.float32) / np.float32(np.iinfo(given.dtype).max)
-            else:
-                found = decode_srgb(given)
+            raw = space == "raw" or (space != "sRGB" and not self._is_encoded(path, given))
+            found = fractions(given) if raw or given.dtype == np.float32 else decode_srgb(given)
             if not np.isfinite(found).all():
                 raise SceneError(f"texture {path}: holds non-finite values")
-            self._colors[path, space] = found.astype(np.float32)
+            self._colors[path, space] = found
         return self._colors[path, space]
 
     def _is_encoded(self, path: str, given: np.ndarray) -> bool:
