@@ -258,7 +258,8 @@ class SceneReader(DirectiveReader):
             self.left_over(parameters, f"shape {kind!r}")
             return
         if isinstance(shape, Mesh):
-            shape, local = shape_of(shape, material, str(directive.place), self.report)
+            shape, found = shape_of(shape, material, str(directive.place), self.report)
+            local = found if local is UNMOVED else product(local, found)
         start, track = self.transforms.current[0], self._motion(self.transforms.current, str(directive.place))
         self._keep(
             Instance(

@@ -15,6 +15,7 @@ from scenes.canonical import Disk, Mesh, SceneError, Shape, Sphere
 from scenes.canonical.values import Matrix
 from scenes.formats.directives.syntax import Parameters
 from scenes.formats.geometry import revolution
+from scenes.formats.geometry.meshed import as_mesh
 from scenes.formats.geometry.orientation import facing_normals, turned
 from scenes.formats.geometry.ply_files import checked_mesh, read_ply
 from scenes.formats.geometry.subdivision import LEVELS, loop_surface
@@ -83,13 +84,18 @@ class ShapeReader:
         turn = parameters.number("phimax", 360.0)
         if not 0.0 < turn <= 360.0:
             raise SceneError(f"{parameters.place}: phimax: expected an angle in (0, 360], got {turn:g}")
+        place = UNMOVED
         if kind == "sphere":
             low, high = parameters.number("zmin", -radius), parameters.number("zmax", radius)
-            if turn == 360.0 and low <= -radius and high >= radius and not turn_over:
+            whole = turn == 360.0 and low <= -radius and high >= radius
+            if whole and not turn_over:
                 return Sphere(radius), UNMOVED
             if not min(low, high) < radius or not max(low, high) > -radius or low == high:
                 raise SceneError(f"{parameters.place}: zmin, zmax: expected heights within the sphere")
-            mesh = revolution.partial_sphere(radius, max(low, -radius), min(high, radius), turn)
+            if whole:
+                mesh, place = as_mesh(Sphere()), np.diag([radius, radius, radius, 1.0])
+            else:
+                mesh = revolution.partial_sphere(radius, max(low, -radius), min(high, radius), turn)
         elif kind == "disk":
             inner, height = parameters.number("innerradius", 0.0), parameters.number("height", 0.0)
             if turn == 360.0 and inner == 0.0 and not turn_over:
@@ -117,7 +123,7 @@ class ShapeReader:
                 raise SceneError(f"{parameters.place}: hyperboloid: expected p1 and p2 apart")
             mesh = revolution.hyperboloid(first, second, turn)
         self.report.add(str(parameters.place), f"shape {kind!r}", f"a mesh of {len(mesh.faces)} triangles")
-        return (turned(mesh) if turn_over else mesh), UNMOVED
+        return (turned(mesh) if turn_over else mesh), place
 
     def _ply(self, parameters: Parameters, turn_over: bool, beside: Path) -> Mesh | None:
         where, name = str(parameters.place), parameters.text("filename", "")

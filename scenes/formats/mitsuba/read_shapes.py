@@ -35,8 +35,8 @@ from scenes.formats.appearance.mixtures import BLACK, NOTHING, is_nothing
 from scenes.formats.appearance.spectra import grey
 from scenes.formats.geometry import revolution
 from scenes.formats.geometry.mesh_files import obj_materials, obj_part, read_obj, read_serialized
-from scenes.formats.geometry.meshed import as_mesh, depends_on_uv, mitsuba_cube, mitsuba_disk
-from scenes.formats.geometry.orientation import FLIPPED, facing_normals, turned
+from scenes.formats.geometry.meshed import as_mesh, depends_on_uv, mitsuba_cube, mitsuba_disk, turned_over
+from scenes.formats.geometry.orientation import FLIPPED, facing_normals
 from scenes.formats.geometry.ply_files import read_ply
 from scenes.formats.geometry.recognition import shape_of
 from scenes.formats.geometry.transform_stack import motion, moved_by, translation
@@ -123,12 +123,12 @@ class MitsubaShapes:
                     turn_over = not turn_over
                 else:
                     inside, outside = outside, inside
-            if turn_over:
-                if isinstance(shape, Sphere):
-                    became = f"a mesh of {len(as_mesh(shape).faces)} triangles"
-                    self.report.add(properties.where, "a sphere inside out", became)
-                shape = turned(as_mesh(shape))
             made = Instance(shape, material, place, track, node.get("id"), emission, one_sided)
+            if turn_over:
+                made = turned_over(made)
+                if isinstance(shape, Sphere):
+                    became = f"a mesh of {len(as_mesh(made.shape).faces)} triangles"
+                    self.report.add(properties.where, "a sphere inside out", became)
             found.append(dataclasses.replace(made, interior=inside, exterior=outside))
         if found:
             properties.left_over()

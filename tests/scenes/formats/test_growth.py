@@ -19,6 +19,7 @@ from scenes.canonical import (
     Disk,
     Instance,
     Matte,
+    Mesh,
     PerspectiveCamera,
     RigidTrack,
     Scene,
@@ -151,3 +152,25 @@ def test_a_mesh_file_of_many_shapes_is_recognised_once(
     monkeypatch.setattr(recognition, "recognised", lambda mesh: made.append(mesh) or recognised(mesh))
     read = load_scene_file(tmp_path / "a.lxs")
     assert len(read.instances) == 20 and 1 <= len(made) <= 2  # with and without its texture coordinates
+
+
+@pytest.mark.parametrize("name", ["a.pbrt", "a.xml"])
+def test_spheres_inside_out_of_all_sizes_share_a_mesh(name: str, tmp_path: Path) -> None:
+    if name == "a.pbrt":
+        balls = (f'Shape "sphere" "float radius" {0.5 + 0.1 * size}\n' for size in range(20))
+        text = f"{HEAD}ReverseOrientation\n{''.join(balls)}WorldEnd\n"
+    else:
+        flipped = '<boolean name="flipNormals" value="true"/>'
+        balls = (
+            f'<shape type="sphere"><float name="radius" value="{0.5 + 0.1 * size}"/>{flipped}</shape>'
+            for size in range(20)
+        )
+        text = f'<scene version="0.5.0">{SENSOR}{"".join(balls)}</scene>'
+    (tmp_path / name).write_text(text)
+    found = load_scene_file(tmp_path / name).instances
+    assert len({id(one.shape) for one in found}) == 1
+    wide = [np.ptp(_ends(one), axis=0) for one in found]
+    np.testing.assert_allclose(wide, np.repeat(1.0 + 0.2 * np.arange(20)[:, None], 3, axis=1), rtol=1e-4)
+    shape = found[0].shape
+    assert isinstance(shape, Mesh) and shape.normals is not None
+    assert ((shape.normals * shape.vertices).sum(axis=1) < -0.9).all()

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import numpy as np
 import pytest
 
+from scenes.canonical import Rectangle
 from scenes.formats.conversion import load_scene_file
 from scenes.formats.losses import LossReport
 from tests.scenes.formats.files import drawn, seen
@@ -38,3 +40,12 @@ def test_spheres_inside_out_look_as_in_mitsuba_3(scale: int, flip: str, part: st
     known = {"matte": 0.0 if inside_out else 0.5, "both": 0.5, "lamp": 0.0 if inside_out else 3.0}
     assert part == "glass" or wanted == pytest.approx(known[part], abs=0.02)
     assert inside_out <= ("a sphere inside out" in report.text() or part == "both")
+
+
+def test_a_lamp_that_faces_the_other_way_is_a_rectangle(tmp_path: Path) -> None:
+    """The renderer's lamps are rectangles, not meshes."""
+    place = '<transform name="to_world"><translate x="1"/></transform>'
+    (tmp_path / "a.xml").write_text(f'{VIEW}<shape type="rectangle">{FLIPPED}{place}{PARTS["lamp"]}</shape></scene>')
+    (lamp,) = load_scene_file(tmp_path / "a.xml").instances
+    assert isinstance(lamp.shape, Rectangle)
+    np.testing.assert_array_equal(lamp.to_world[:3, 2:].T, [[0.0, 0.0, -1.0], [1.0, 0.0, 0.0]])
