@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from scenes.arithmetic import weighted
 from scenes.canonical import SceneError
+from scenes.formats.geometry.polygons import triangles_of as cut_polygons
 from scenes.formats.geometry.subdivision import Refined
 from scenes.formats.losses import LossReport
 from scenes.models.smoothing import corner_normals
@@ -51,7 +52,7 @@ class Triangles:
 
 
 def triangles_of(mesh: Any, code: Any, where: str, report: LossReport) -> Triangles | None:
-    """The triangles of a mesh: polygons are split into fans about their first corner, and holes are left out.
+    """The triangles of a mesh: polygons are cut into triangles, and holes are left out.
 
     Args:
         mesh: ``UsdGeom.Mesh``.
@@ -84,13 +85,14 @@ def triangles_of(mesh: Any, code: Any, where: str, report: LossReport) -> Triang
     if surface is not None:
         points, counts, indices = weighted(surface.smooth, points), surface.cage.counts, surface.cage.indices
         of_polygon = surface.polygon
-    parts = np.where(hole[of_polygon], 0, np.maximum(counts - 2, 0))
-    polygon = np.repeat(np.arange(len(counts)), parts)
-    if not len(polygon):
+    drawn = (counts >= 3) & ~hole[of_polygon]
+    if not drawn.any():
         return None
-    within = np.arange(len(polygon)) - np.repeat(np.cumsum(parts) - parts, parts)
-    first = (np.cumsum(counts) - counts)[polygon]
-    corner = np.stack([first, first + within + 1, first + within + 2], axis=1)
+    at = np.flatnonzero(np.repeat(drawn, counts))
+    cut = cut_polygons(points, indices[at], counts[drawn])
+    if cut.uncovered:
+        report.add(where, f"{cut.uncovered} concave polygons of many corners", "fans about their first corner")
+    corner, polygon = at[cut.corners], np.flatnonzero(drawn)[cut.polygon]
     if mesh.GetOrientationAttr().Get() == UsdGeom.Tokens.leftHanded:
         corner = corner[:, ::-1]
     return Triangles(points, indices[corner], corner, of_polygon[polygon], polygons, surface)

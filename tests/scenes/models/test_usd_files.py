@@ -51,6 +51,20 @@ def test_polygons_holes_and_orientation(tmp_path: Path) -> None:
     assert area_normal(read_model(left)[0]) == pytest.approx((0.0, 0.0, -5.0))
 
 
+def test_concave_polygons_are_covered_once(tmp_path: Path) -> None:
+    """A dart of area 1.5 whose fan about its first corner covers 2 and turns a triangle over."""
+    shape = """
+        int[] faceVertexCounts = [4]
+        int[] faceVertexIndices = [0, 1, 2, 3]
+        point3f[] points = [(0,0,0),(2,1,0),(0,2,0),(0.5,1,0)]
+        uniform token subdivisionScheme = "none"
+    """
+    (part,) = read_model(written(tmp_path, mesh(shape=shape)))
+    corners = world(part)
+    areas = 0.5 * np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])[:, 2]
+    assert (areas > 0.0).all() and areas.sum() == pytest.approx(1.5)
+
+
 def test_subsets_have_their_own_materials(tmp_path: Path) -> None:
     shape = """
         int[] faceVertexCounts = [3, 3, 3]
