@@ -73,6 +73,7 @@ class GltfMaterials:
         """
         given = {} if number is None else self.data.at("materials", number)
         where = f"material {given.get('name', number)}" if given else "the default material"
+        given = self._without_missing(given, where)
         lookup = lookup_of(_rough(given).get("baseColorTexture"))
         if lookup is not None and lookup.coordinates not in sets:
             self.report.add(where, "a texture on a part without its texture coordinates")
@@ -103,6 +104,21 @@ class GltfMaterials:
         if key not in self._made or (lookup is None) != (lookup_of(_rough(given).get("baseColorTexture")) is None):
             self._made[key] = self._material(given, where, lookup, None, shared, veil)
         return Painted(self._made[key], uvs, medium=medium)
+
+    def _without_missing(self, given: dict[str, Any], where: str) -> dict[str, Any]:
+        """A material without the textures whose pictures are missing, and without emission where its texture is."""
+        rough, changed = dict(_rough(given)), dict(given)
+        parts = [(rough, "baseColorTexture"), (rough, "metallicRoughnessTexture"), (changed, "emissiveTexture")]
+        for part, name in (*parts, *([(changed, "normalTexture")] if self._facets else [])):
+            lookup = lookup_of(part.get(name))
+            missing = "" if lookup is None else self.textures.missing(lookup)
+            if missing:
+                shines = name == "emissiveTexture"
+                became = "no emission" if shines else "left out"
+                self.report.add(where, f"the picture {missing!r}, which is missing", became)
+                del part[name]
+                changed |= {"pbrMetallicRoughness": rough} | ({"emissiveFactor": [0.0, 0.0, 0.0]} if shines else {})
+        return changed
 
     def _material(
         self,

@@ -99,6 +99,10 @@ class Textures(ABC):
     def picture(self, lookup: Lookup, numbers: bool = False) -> Pixels:
         """Texels ``(h, w, 3)`` of a texture: linear colours, or raw values with ``numbers``."""
 
+    def missing(self, lookup: Lookup) -> str:
+        """The name of the picture of a texture if there is no such file; empty if there is."""
+        return ""
+
     @abstractmethod
     def opacity(self, lookup: Lookup) -> Pixels:
         """Texels ``(h, w, 3)`` of the opacity of a texture; 1 if it has none."""
@@ -153,6 +157,10 @@ class GltfTextures(Textures):
             found = self._decoded(source, alpha_of)
             self._opacities[source] = np.repeat(found[..., None], 3, axis=-1)
         return self._opacities[source]
+
+    def missing(self, lookup: Lookup) -> str:
+        name, content = self.data.image_bytes(self._source(lookup))
+        return name if content is None and self.data.sources.find(name) is None else ""
 
     def _source(self, lookup: Lookup) -> int:
         texture = self.data.at("textures", lookup.texture)

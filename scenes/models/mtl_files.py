@@ -36,7 +36,7 @@ from scenes.canonical import (
 from scenes.formats.appearance.folding import mean_of
 from scenes.formats.appearance.spectra import rgb
 from scenes.formats.losses import LossReport
-from scenes.loading import read_alpha, read_values
+from scenes.loading import read_alpha, read_image, read_values
 from scenes.models.phong_of_parts import EXPONENT_MAX, diffuse_share, glowing, metallic_rough, scaled, seen_through
 from scenes.models.sources import Sources
 from scenes.pictures import Pixels
@@ -137,22 +137,22 @@ def _is_number(word: str) -> bool:
     return True
 
 
-def picture_of(line: str, sources: Sources, where: str, report: LossReport) -> ImageTexture:
-    """The texture of a map: ``-s`` scales and ``-o`` offsets the coordinates, ``-clamp`` clamps them, ``-mm`` changes
-    the values; other options are reported.
+def _diffuse(line: str, rest: Texture, sources: Sources, where: str, report: LossReport) -> Texture:
+    """The texture of a map; ``rest`` if its image is missing, which is reported.
 
     Raises:
-        SceneError: the image is missing, or cannot be read.
+        SceneError: the image cannot be read.
     """
     found = map_of(line)
-    path, image = sources.picture(found.name)
-    return _texture(found, image, path, where, report)
+    path = sources.known(found.name, where, report, "the picture", "the colour without it")
+    return rest if path is None else _texture(found, read_image(path), path, where, report)
 
 
 def _texture(
     found: MtlMap, image: Pixels, path: Path, where: str, report: LossReport, read: frozenset[str] = frozenset()
 ) -> ImageTexture:
-    """The texture of an image; options in ``read`` are used by the caller."""
+    """The texture of an image: ``-s`` scales and ``-o`` offsets the coordinates, ``-clamp`` clamps them, and ``-mm``
+    changes the values; options in ``read`` are used by the caller, and others are reported."""
     base, gain = found.pair("-mm", 1.0) if "-mm" in found.options else (0.0, 1.0)
     if (base, gain) != (0.0, 1.0):
         image = np.clip(base + gain * image, 0.0, None).astype(np.float32)
@@ -166,7 +166,7 @@ def material_of(name: str, entry: _Entry, sources: Sources, report: LossReport, 
     """A material of a library, for path tracing with ``facets``.
 
     Raises:
-        SceneError: a number is invalid, or a diffuse image is missing.
+        SceneError: a number is invalid, or an image cannot be read.
     """
     where = f"material {name}"
     used = ("map_kd", *_UNUSED, *(_ALONG_PATHS if facets else ()))
@@ -179,7 +179,7 @@ def material_of(name: str, entry: _Entry, sources: Sources, report: LossReport, 
         diffuse = (0.5, 0.5, 0.5)
     texture: Texture = ConstantTexture(rgb(np.clip(diffuse, 0.0, 1.0)))
     if "map_kd" in entry.lines:
-        texture = picture_of(entry.lines["map_kd"], sources, where, report)
+        texture = _diffuse(entry.lines["map_kd"], texture, sources, where, report)
     material = _reflecting(entry, texture, where, report)
     opacity = entry.number("d", 1.0 - entry.number("tr", 0.0))
     opacity = float(np.clip(opacity, 0.0, 1.0))
@@ -194,15 +194,19 @@ def _along_paths(
     material: Material, opacity: float, entry: _Entry, sources: Sources, where: str, report: LossReport
 ) -> Material:
     """A material with its normal map and its holes."""
-    if "norm" in entry.lines:
-        found = map_of(entry.lines["norm"])
-        path = sources.require(found.name, "a texture at")
+
+    def named(keyword: str) -> tuple[MtlMap, Path | None]:
+        found = map_of(entry.lines.get(keyword, ""))
+        known = keyword in entry.lines
+        return found, sources.known(found.name, where, report, "the picture") if known else None
+
+    found, path = named("norm")
+    if path is not None:
         normals = _texture(found, read_values(path), path, where, report, frozenset({"-bm"}))
         scale = _number(found.options["-bm"][0]) if found.options.get("-bm") else 1.0
         material = NormalMapped(material, normals, scale)
-    if "map_d" in entry.lines:
-        found = map_of(entry.lines["map_d"])
-        path = sources.require(found.name, "a texture at")
+    found, path = named("map_d")
+    if path is not None:
         channel = found.options.get("-imfchan", ("",))[0].lower()
         values = np.repeat(_channel(channel, path)[..., None], 3, axis=2) * np.float32(opacity)
         read = frozenset({"-imfchan"} if channel in _CHANNELS else ())

@@ -57,7 +57,7 @@ def read_obj(sources: Sources, report: LossReport, facets: bool = False) -> tupl
     Colours after the coordinates of vertices are assumed to be sRGB.
 
     Raises:
-        SceneError: the file cannot be read, or a material library or a diffuse image is missing.
+        SceneError: the file cannot be read, or an image of its materials.
     """
     stem = sources.path.stem
     file = _parsed(text_of(sources.path))
@@ -151,8 +151,8 @@ def _materials(libraries: list[str], sources: Sources, report: LossReport, facet
         # a name may contain spaces, and a line several names
         names = [line] if sources.find(line) is not None else line.split() or [line]
         for name in names:
-            path = sources.require(name, "its materials in")
-            for material, entry in entries(text_of(path)).items():
+            path = sources.known(name, sources.path.stem, report, "the materials")
+            for material, entry in entries("" if path is None else text_of(path)).items():
                 if material not in found:
                     found[material] = material_of(material, entry, sources, report, facets)
     return found

@@ -7,8 +7,8 @@ from pathlib import Path
 from urllib.parse import unquote
 
 from scenes.canonical import SceneError
-from scenes.loading import FileState, read_image, state_of
-from scenes.pictures import Pixels
+from scenes.formats.losses import LossReport
+from scenes.loading import FileState, state_of
 
 _MARKS = ((codecs.BOM_UTF8, "utf-8-sig"), (codecs.BOM_UTF16_LE, "utf-16"), (codecs.BOM_UTF16_BE, "utf-16"))
 
@@ -57,14 +57,12 @@ class Sources:
             raise SceneError(f"expected {what} {self.path.parent / name}, found no file")
         return path
 
-    def picture(self, name: str) -> tuple[Path, Pixels]:
-        """An image by its file name, as linear RGB, and its path.
-
-        Raises:
-            SceneError: the image is missing, or cannot be read.
-        """
-        path = self.require(name, "a texture at")
-        return path, read_image(path)
+    def known(self, name: str, where: str, report: LossReport, what: str, became: str = "left out") -> Path | None:
+        """Like :meth:`find`, but a missing file is a loss."""
+        path = self.find(name)
+        if path is None:
+            report.add(where, f"{what} {name!r}, which is missing", became)
+        return path
 
 
 def text_of(path: Path) -> str:

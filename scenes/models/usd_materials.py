@@ -12,7 +12,7 @@ import numpy as np
 
 from scenes.formats.losses import LossReport
 from scenes.models.gltf_textures import multiplied
-from scenes.models.usd_library import Sdf, UsdShade
+from scenes.models.usd_library import Ar, Sdf, UsdShade
 from scenes.models.usd_motion import UsdMotion
 from scenes.models.usd_textures import WRAPS, Make, Pictures, Reading, UsdDocument
 from scenes.models.usd_values import finite, note_animated
@@ -226,8 +226,8 @@ class UsdMaterials:
         return None
 
     def _fallback(self, shader: Any, channels: str, name: str) -> Any:
-        """The value of an input whose picture is missing."""
-        given = [float(part) for part in self._constant(shader, "fallback")]
+        """The value of an input whose picture is missing, by default that of UsdUVTexture."""
+        given = [float(part) for part in self._constant(shader, "fallback") or (0.0, 0.0, 0.0, 1.0)]
         parts = 3 * (given["rgba".index(channels)],) if channels in tuple("rgba") else tuple(given[:3])
         return parts[0] if name in _NUMBERS else parts
 
@@ -247,23 +247,22 @@ class UsdMaterials:
         return reading
 
     def _file(self, shader: Any, where: str) -> str | None:
-        """The resolved path of the picture of a UsdUVTexture; None if it is missing and the file has a fallback."""
-        given = shader.GetInput("file")
+        """The resolved path of the picture of a UsdUVTexture; None if it is missing, which is reported."""
+        name, given = "", shader.GetInput("file")
         for attribute in UsdShade.Utils.GetValueProducingAttributes(given) if given else ():
             note_animated(attribute.GetPrim(), self.pose)
             found = attribute.Get(self.code)
             if isinstance(found, Sdf.AssetPath):
-                path = found.resolvedPath
+                name, path = found.path, found.resolvedPath
                 if "<UDIM>" in found.path:
                     self.report.add(where, "tiles of a texture", "the first one")
                     layer = attribute.GetPropertyStack(self.code)[0].layer
-                    path = layer.ComputeAbsolutePath(found.path.replace("<UDIM>", "1001"))
-                sources = self.document.sources
-                if not path and self._constant(shader, "fallback") is not None and sources.find(found.path) is None:
-                    self.report.add(where, f"a missing texture {found.path}", "its fallback")
-                    return None
-                return path or str(sources.require(found.path, "a texture at"))
-        return str(self.document.sources.require("", f"{where}: a file of a texture, found none;"))
+                    name = found.path.replace("<UDIM>", "1001")
+                    path = str(Ar.GetResolver().Resolve(layer.ComputeAbsolutePath(name)))
+                if path:
+                    return path
+        known = self.document.sources.known(name, where, self.report, "the picture", "its fallback")
+        return None if known is None else str(known)
 
     def _coordinates(self, shader: Any, where: str) -> tuple[int, tuple[Any, ...]]:
         """The number of the texture coordinates, and their scale, rotation in degrees and offset."""

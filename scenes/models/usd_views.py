@@ -191,10 +191,12 @@ def _dome(
     image = np.ones((1, 1, 3), np.float32)
     file = _value(prim, "texture:file", code, None)
     if file is not None and file.path:
-        path = file.resolvedPath or str(pictures.sources.require(file.path, "an environment map at"))
-        if str(_value(prim, "texture:format", code, "automatic")) not in ("automatic", "latlong"):
+        name = str(prim.GetName())
+        path = file.resolvedPath or pictures.sources.known(file.path, name, report, "the picture", "even light")
+        if path is not None and str(_value(prim, "texture:format", code, "automatic")) not in ("automatic", "latlong"):
             report.add(prim.GetName(), "the layout of an environment map", "latitude and longitude")
         space = prim.GetAttribute("inputs:texture:file").GetColorSpace()
         space = space if space in ("raw", "sRGB") else "auto"
-        image = pictures.values(Reading(path, "rgb", space, *_IDENTITY, ()))
+        if path is not None:
+            image = pictures.values(Reading(str(path), "rgb", space, *_IDENTITY, ()))
     return EnvironmentLight((image * radiance.astype(np.float32)).astype(np.float32), turn, source=str(prim.GetName()))

@@ -119,13 +119,10 @@ def broken(folder: Path, kind: str) -> Path:
     text = {
         "no faces": SQUARE,
         "NaN": SQUARE.replace("v 2 3 0", "v 2 nan 0") + FACES,
-        "no library": "mtllib gone.mtl\n" + SQUARE + FACES,
         "nothing": "",
         "index beyond": SQUARE + "f 1 2 9\n",
         "half a face": SQUARE + "f 1 2",
     }.get(kind)
-    if kind == "no texture":
-        return written(folder, "newmtl paint\nmap_Kd gone.png\n")
     if kind == "other kind":
         path = path.with_suffix(".blend")
         path.write_text("x")
@@ -142,8 +139,6 @@ def broken(folder: Path, kind: str) -> Path:
     [
         ("no faces", "at least one face"),
         ("NaN", "vertices hold non-finite values"),
-        ("no library", "gone.mtl"),
-        ("no texture", "gone.png"),
         ("nothing", "cannot be read|at least one face"),
         ("index beyond", "cannot be read"),
         ("half a face", "cannot be read|at least one face"),

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from scenes.canonical import ConstantTexture, DirectionalLight, MetallicRough, SceneError
+from scenes.canonical import ConstantTexture, DirectionalLight, EnvironmentLight, MetallicRough, SceneError
 from scenes.formats.losses import LossReport
 from scenes.models import read_model, read_whole, usd_files
 from scenes.models.sources import Sources
@@ -98,15 +98,27 @@ def test_normals_that_are_not_finite_are_those_of_the_face(name: str, tmp_path: 
     assert "quad: non-finite normals: those of the faces" in report.text()
 
 
-def test_a_missing_picture_has_its_fallback(tmp_path: Path) -> None:
-    node = texture(
-        "T", "none.png", "float4 inputs:fallback = (0.25, 0.5, 0.75, 1)", "float3 outputs:rgb\nfloat outputs:g"
-    )
+@pytest.mark.parametrize("file", ["none.png", "none.<UDIM>.png", ""])
+@pytest.mark.parametrize("given", [True, False])
+def test_a_missing_picture_has_its_fallback(file: str, given: bool, tmp_path: Path) -> None:
+    """By default that of UsdUVTexture, black and opaque."""
+    fallback = "float4 inputs:fallback = (0.25, 0.5, 0.75, 1)" if given else ""
+    node = texture("T", file, fallback, "float3 outputs:rgb\nfloat outputs:g")
     inputs = """color3f inputs:diffuseColor.connect = </Mat/T.outputs:rgb>
             float inputs:roughness.connect = </Mat/T.outputs:g>"""
     report = LossReport()
     body = mesh(ST + BOUND) + material(inputs, node + READER)
     (part,) = read_model(written(tmp_path, body), report, facets=True)
     assert isinstance(part.material, MetallicRough)
-    assert part.material.base == ConstantTexture((0.25, 0.5, 0.75)) and part.material.roughness == 0.5
-    assert "material Mat: a missing texture none.png: its fallback" in report.text()
+    color, roughness = ((0.25, 0.5, 0.75), 0.5) if given else ((0.0, 0.0, 0.0), 0.0)
+    assert part.material.base == ConstantTexture(color) and part.material.roughness == roughness
+    name = file.replace("<UDIM>", "1001")
+    assert f"material Mat: the picture {name!r}, which is missing: its fallback" in report.text()
+
+
+def test_a_missing_environment_is_even(tmp_path: Path) -> None:
+    dome = 'def DomeLight "d" { float inputs:intensity = 2\nasset inputs:texture:file = @gone.hdr@ }\n'
+    report = LossReport()
+    (light,) = read_whole(written(tmp_path, mesh() + dome), report).lights
+    assert isinstance(light, EnvironmentLight) and (light.image == 2.0).all()
+    assert "d: the picture 'gone.hdr', which is missing: even light" in report.text()

@@ -195,8 +195,6 @@ HOSTILE = {
                                         "point3f[] positions = [(0, 0, 0)]\nrel prototypes = [</p>]\n }",
     "positive apertures": mesh() + 'def Camera "c" { float focalLength = 0 }',
     "finite numbers, got inf": mesh() + 'def SphereLight "l" { float inputs:intensity = inf }',
-    "gone.png, found no file": textured("color3f inputs:diffuseColor.connect = </Mat/T.outputs:rgb>",
-                                        texture("T", "gone.png")),
     "cannot identify image file": textured("color3f inputs:diffuseColor.connect = </Mat/T.outputs:rgb>",
                                                  texture("T", "in.usda")),
     "animation: expected at most 65536 keys": mesh(
