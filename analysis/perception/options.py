@@ -20,6 +20,7 @@ from tsar.policies import POLICIES
 _ASSETS = Path(__file__).resolve().parents[2] / "scenes" / "assets"
 _SIGMAS_JOD = (1e-3, 100.0)
 STUDY_JOBS = (_ASSETS / "plane" / "study_job.txt", _ASSETS / "spheres" / "study_job.txt")
+"""Job files of the study of the thesis."""
 
 
 @dataclass(frozen=True)
@@ -27,8 +28,8 @@ STUDY_JOBS = (_ASSETS / "plane" / "study_job.txt", _ASSETS / "spheres" / "study_
 class StimuliOptions:
     """Renders the stimuli of job files, and a manifest with their hashes; continues where it was stopped."""
 
-    jobs: Annotated[tuple[Path, ...], tyro.conf.Positional] = STUDY_JOBS
-    """Job files; by default the thesis' study: two scenes, eight levels, three point sets, truncated box."""
+    jobs: Annotated[tuple[Path, ...], tyro.conf.Positional] = ()
+    """Job files; the thesis' study where none is named: two scenes, eight levels, three point sets, truncated box."""
     width_px: int = 768
     """Width, pixels; of a frame, also its height."""
     first_frame: int = 60
@@ -60,7 +61,6 @@ class StimuliOptions:
             threads=limits.THREADS,
             worker_wait_s=limits.WORKER_WAITS_S,
         )
-        require(len(self.jobs) >= 1, "jobs", "at least one", self.jobs)
 
 
 @dataclass(frozen=True)

@@ -17,7 +17,7 @@ from PIL import Image
 from analysis.command.cli import InputError
 from analysis.command.progress import Bars
 from analysis.metrics.display_model import DisplayModel
-from analysis.perception.options import StimuliOptions
+from analysis.perception.options import STUDY_JOBS, StimuliOptions
 from analysis.storage.journal import Journal
 from analysis.storage.reference import content_hash
 from analysis.storage.source import code_hash
@@ -42,7 +42,7 @@ def render_stimuli(options: StimuliOptions, bars: Bars) -> dict[str, Any]:
         The manifest: one row a stimulus, with its folder, number of frames and their hash.
     """
     rows: list[dict[str, Any]] = []
-    for job_file in options.jobs:
+    for job_file in options.jobs or STUDY_JOBS:
         job = JobOptions(
             job=job_file,
             width_px=options.width_px,

@@ -1,0 +1,62 @@
+"""Times a newcomer's first hour: clone, install, first picture, page of the demo, with no kernels compiled before.
+
+    python docs/first_hour.py FOLDER [REVISION]
+
+FOLDER must not exist. A line for each command: when it ended, seconds since the start, how long it took, and processor time of it
+and its children. The last lines say the revision, the load of the machine and how much it did beside this.
+"""
+
+from __future__ import annotations
+
+import datetime
+import os
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import psutil
+
+HERE = Path(__file__).resolve().parent.parent
+COMMANDS = (
+    ("make", ".venv/.base"),
+    (".venv/bin/python", "scripts/render.py", "fly-by", "--out", "out/first"),
+    ("make", "demo"),
+)
+
+
+def processor_s() -> float:
+    """Processor seconds of all children that have ended."""
+    spent = os.times()
+    return spent.children_user + spent.children_system
+
+
+def main() -> None:
+    if len(sys.argv) not in (2, 3) or Path(sys.argv[1]).exists():
+        sys.exit("expected a folder that does not exist, and a revision or nothing")
+    folder, revision = Path(sys.argv[1]).resolve(), sys.argv[2] if len(sys.argv) == 3 else "HEAD"
+    commit = subprocess.run(["git", "rev-parse", revision], cwd=HERE, check=True, capture_output=True, text=True).stdout.strip()
+    environment = {name: value for name, value in os.environ.items() if name not in ("PYTHONPATH", "VIRTUAL_ENV")}
+    environment["WARP_CACHE_PATH"] = str(folder.with_name(f"{folder.name}-kernels"))
+    begun, busy = time.monotonic(), psutil.cpu_times()
+    print("| command | ends after, s | takes, s | of processor time, s |\n|---|---|---|---|")
+
+    def take(command: tuple[str, ...], where: Path) -> None:
+        before, spent = time.monotonic(), processor_s()
+        subprocess.run(command, cwd=where, env=environment, check=True, stdout=sys.stderr)
+        now = time.monotonic()
+        row = (f"`{' '.join(command)}`", f"{now - begun:.0f}", f"{now - before:.0f}", f"{processor_s() - spent:.0f}")
+        print("| " + " | ".join(row) + " |", flush=True)
+
+    take(("git", "clone", "--quiet", str(HERE), str(folder)), HERE)
+    subprocess.run(["git", "checkout", "--quiet", commit], cwd=folder, check=True)
+    for command in COMMANDS:
+        take(command, folder)
+    after = psutil.cpu_times()
+    used = sum(after) - sum(busy) - (after.idle - busy.idle)
+    print(f"\nRevision {commit[:7]}, {datetime.date.today()}, load {os.getloadavg()[0]:.1f} at the end; ", end="")
+    print(f"these commands took {processor_s():.0f} of the {used:.0f} s that the machine's {psutil.cpu_count()} cores worked.")
+
+
+if __name__ == "__main__":
+    main()
