@@ -2,8 +2,8 @@
 
     python docs/first_hour.py FOLDER [REVISION]
 
-FOLDER must not exist. A line for each command: when it ended, seconds since the start, how long it took, and processor time of it
-and its children. The last lines say the revision, the load of the machine and how much it did beside this.
+FOLDER must not exist. Each command has a line: seconds from the start to its end, how long it took, and processor time
+of it and its children. The last line says the revision, and how busy the machine was.
 """
 
 from __future__ import annotations
@@ -35,7 +35,9 @@ def main() -> None:
     if len(sys.argv) not in (2, 3) or Path(sys.argv[1]).exists():
         sys.exit("expected a folder that does not exist, and a revision or nothing")
     folder, revision = Path(sys.argv[1]).resolve(), sys.argv[2] if len(sys.argv) == 3 else "HEAD"
-    commit = subprocess.run(["git", "rev-parse", revision], cwd=HERE, check=True, capture_output=True, text=True).stdout.strip()
+    commit = subprocess.run(
+        ["git", "rev-parse", revision], cwd=HERE, check=True, capture_output=True, text=True
+    ).stdout.strip()
     environment = {name: value for name, value in os.environ.items() if name not in ("PYTHONPATH", "VIRTUAL_ENV")}
     environment["WARP_CACHE_PATH"] = str(folder.with_name(f"{folder.name}-kernels"))
     begun, busy = time.monotonic(), psutil.cpu_times()
@@ -54,8 +56,8 @@ def main() -> None:
         take(command, folder)
     after = psutil.cpu_times()
     used = sum(after) - sum(busy) - (after.idle - busy.idle)
-    print(f"\nRevision {commit[:7]}, {datetime.date.today()}, load {os.getloadavg()[0]:.1f} at the end; ", end="")
-    print(f"these commands took {processor_s():.0f} of the {used:.0f} s that the machine's {psutil.cpu_count()} cores worked.")
+    print(f"\nRevision {commit[:7]}, {datetime.date.today()}, load {os.getloadavg()[0]:.1f} at the end.")
+    print(f"These commands did {processor_s():.0f} s of the {used:.0f} s of work of {psutil.cpu_count()} cores.")
 
 
 if __name__ == "__main__":

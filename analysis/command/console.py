@@ -50,12 +50,12 @@ def console(width: int | None = None) -> Console:
 
 
 def show(*parts: Table | str) -> None:
-    """Prints tables and lines of text in order."""
+    """Prints tables that have rows and lines of text, in order."""
     shown = console()
     for part in parts:
         if isinstance(part, str):
             shown.print(part, soft_wrap=True)
-        else:
+        elif part.rows:
             shown.print(laid_out(part))
 
 
@@ -80,9 +80,11 @@ def laid_out(table: Table) -> RichTable:
 
 
 def markdown(tables: Sequence[Table]) -> str:
-    """Tables as Markdown, each under its title."""
+    """Tables that have rows as Markdown, each under its title."""
     parts = []
     for table in tables:
+        if not table.rows:
+            continue
         lines = [table.header, ["---"] * len(table.header), *table.rows]
         parts.append("\n".join([f"{table.title}:", "", *("| " + " | ".join(line) + " |" for line in lines)]))
     return "\n\n".join(parts) + "\n"

@@ -31,7 +31,7 @@ class Report:
         key_numbers: table before the figures; None for none.
         figures: caption and PNG bytes.
         comparer: pictures at many times and curves, before everything else; None for a page without one.
-        tables: tables after the figures, in order.
+        tables: tables after the figures, in order. Those without rows are left out.
         details: nested mappings that are shown as lists of names and values (configuration, provenance).
         explorer: points with settings and pictures, before everything else; None for a page without one.
     """

@@ -17,7 +17,7 @@ Tables = Mapping[str, pd.DataFrame]
 
 
 def shown_tables(tables: Tables) -> list[Table]:
-    """The main tables, as text."""
+    """The main tables that have rows, as text."""
     percentiles = tables["table_7_2"]
     names = [name for name in percentiles.columns if f"{name} thesis" in percentiles.columns]
     rows = [
@@ -26,7 +26,7 @@ def shown_tables(tables: Tables) -> list[Table]:
         for line in percentiles.to_dict("records")
     ]
     header = ["row", "batch", "resolution", *names]
-    return [
+    found = [
         Table("Greatest suitable percentile, ours (thesis)", header, rows, words=0),
         *_rivalry(tables),
         *(
@@ -40,6 +40,7 @@ def shown_tables(tables: Tables) -> list[Table]:
             )
         ),
     ]
+    return [table for table in found if table.rows]
 
 
 def _rivalry(tables: Tables) -> list[Table]:
@@ -73,11 +74,13 @@ def write_page(path: Path, summary: Mapping[str, Any], tables: Tables, pictures:
         frame_table(tables["regions"], "Causes of the error by region", ".5f"),
         frame_table(tables["disagreements"], "Runs whose better renderer depends on the metric (1: thesis)", ".0f"),
     ]
+    ratio = "The ratio is the mean squared error of the policy thesis over that of the framed renderer at each time. "
+    if not len(tables["runs"]):
+        ratio = ""
     lead = [
         f"{summary['runs_done']} of {summary['runs']} runs at scale {config['scale']}, ledger {summary['ledger']}, "
-        f"{config['repetitions']} repetitions, each with its seed and phase. The ratio is the mean squared error "
-        f"of the policy thesis over that of the framed renderer at each reference time. A framed image of one sample "
-        f"a pixel is shown {config['framed_rate_hz']:g} times a second.",
+        f"{config['repetitions']} repetitions, each with its seed and phase. {ratio}A framed image of one sample a "
+        f"pixel is shown {config['framed_rate_hz']:g} times a second.",
         f"JOD by ColorVideoVDP for the display {summary['display'].name} at {summary['display'].rate_hz:g} Hz, from "
         f"{config['jod_span_s'][0]:g} s to {config['jod_span_s'][1]:g} s of the first {config['jod_repetitions']} "
         "repetitions.",
@@ -87,9 +90,9 @@ def write_page(path: Path, summary: Mapping[str, Any], tables: Tables, pictures:
     write_report(
         path,
         Report(
-            title="Suitability of the policy thesis",
+            title=f"Suitability of {' and '.join(config['policies'])}",
             lead=lead,
-            key_numbers=shown[0],
+            key_numbers=shown[0] if shown else None,
             figures=[(caption, file.read_bytes()) for caption, file in pictures.items()],
             tables=shown[1:],
             details={"Configuration": config, "Provenance": summary["provenance"]},

@@ -5,6 +5,7 @@ from __future__ import annotations
 import errno
 import json
 import os
+import re
 import signal
 import subprocess
 import sys
@@ -133,6 +134,20 @@ def test_the_reasons_of_failures_are_said_whatever_is_left(
     if not full:
         found = json.loads((tmp_path / "summary.json").read_text())
         assert found["runs_done"] + len(found["failures"]) == found["runs"] and (tmp_path / "report.html").exists()
+
+
+def test_without_the_policy_thesis_nothing_is_said_of_it(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture
+) -> None:
+    let_fail(("nobody",), monkeypatch)
+    named = ("--policies", "tsar", "--rivals", "framed-super", "--beside", "--solvers")
+    sizes = ("--inputs", "chase", "--rows", "6", "--repetitions", "1")
+    where = ("--out", str(tmp_path), "--references", str(tmp_path))
+    assert call_script("suitability.py", monkeypatch, *sizes, *named, *where) == 0
+    shown, page = capsys.readouterr().out, (tmp_path / "report.html").read_text()
+    assert "Error of policies beside framed (F)" in shown and "<title>Suitability of tsar" in page
+    for text in (shown, page, (tmp_path / "tables.md").read_text()):
+        assert "tsar" in text and not re.search("thesis better|ours \\(thesis\\)|policy thesis|Agreement", text)
 
 
 def test_an_interrupt_ends_a_study_with_one_line(tmp_path: Path) -> None:

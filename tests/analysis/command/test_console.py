@@ -9,9 +9,10 @@ from typing import Any
 import pandas as pd
 import pytest
 
-from analysis.command.console import frame_table, show
+from analysis.command.console import frame_table, markdown, show
 from analysis.command.progress import bars
 from analysis.comparison import run_command
+from analysis.page.report import Report, render
 from tests.scripts.commands import call_script
 
 ROOT = Path(__file__).resolve().parents[3]
@@ -22,6 +23,13 @@ def test_text_is_printed_as_it_is(capsys: pytest.CaptureFixture) -> None:
     show(f"written to {ODD}", frame_table(pd.DataFrame({ODD: [ODD]}), title=f"of {ODD}"))
     printed = capsys.readouterr().out
     assert f"written to {ODD}" in printed and f"of {ODD}" in printed and printed.count(ODD) == 4
+
+
+def test_tables_without_rows_are_left_out(capsys: pytest.CaptureFixture) -> None:
+    tables = [frame_table(pd.DataFrame({"a": [1]}), "given"), frame_table(pd.DataFrame({"a": []}), "lacking")]
+    show(*tables)
+    for text in (capsys.readouterr().out, markdown(tables), render(Report("t", [], tables[1], tables=tables))):
+        assert "given" in text and "lacking" not in text
 
 
 def test_bars_show_names_as_they_are(capsys: pytest.CaptureFixture) -> None:
