@@ -92,13 +92,18 @@ def load(scene: str | Scene, phase: float = 0.0) -> Scene:
 
 
 def require_known(scene: str) -> None:
-    """Rejects a name that is neither the name or number of a scene nor that of a file, without loading anything.
+    """Rejects what is neither the name or number of a scene nor a file that is there, without loading anything.
 
     Raises:
         ConfigError: the name is rejected; the message lists the known names and the nearest of them.
+        SceneError: it has the ending of a file, and there is none.
     """
-    if not Path(scene).suffix and not (scene.isdecimal() and int(scene) < len(NAMES)):
+    if scene in SCENES or (scene.isdecimal() and int(scene) < len(NAMES)):
+        return
+    if not Path(scene).suffix:
         SCENES.require(scene, "scene")
+    if not Path(scene).is_file():
+        raise SceneError(f"{scene}: expected a scene file or a model, found none")
 
 
 def load_file(

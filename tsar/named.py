@@ -22,7 +22,7 @@ Entry = TypeVar("Entry")
 
 def not_among(name: object, known: Iterable[str]) -> str:
     """What to say of a name that is none of the known ones: these, the name, and the nearest of them if one is near."""
-    names = list(known)
+    names = [name for name in known if name]  # an empty one stands for none
     near = difflib.get_close_matches(str(name), names, n=1)
     hint = f" (nearest: {near[0]})" if near else ""
     return f"expected one of {', '.join(names)}, got {name!r}{hint}"

@@ -18,6 +18,8 @@ _KINDS = re.compile(rf"^{_KIND}+(?: {_KIND}+)*(?= |$)")
 _IN_WORDS = {
     "INT": "a whole number",
     "FLOAT": "a number",
+    "STR": "a name",
+    "PATH": "a file",
     "[INT [INT ...]]": "whole numbers",
     "[FLOAT [FLOAT ...]]": "numbers",
 }
@@ -65,9 +67,17 @@ def _rejected(text: str, given: Sequence[str]) -> str:
     if found is None or kind is None:
         return ""
     name = found["name"]
-    asked = kind[0].replace("{None}|", "")
-    expected = _IN_WORDS.get(asked) or re.sub(r"[{}]", "", asked).replace("|", " or ")
+    expected = " or ".join(map(_in_words, kind[0].replace("{None}|", "").split("|")))
     return f"{name}: expected {expected}, got {_values_of(name, given)}"
+
+
+def _in_words(kind: str) -> str:
+    """A kind of value as one says it, such as ``6 numbers``."""
+    kind = re.sub(r"[{}]", "", kind)
+    names = kind.split()
+    if len(names) > 1 and set(names) == {"FLOAT"}:
+        return f"{len(names)} numbers"
+    return _IN_WORDS.get(kind, kind)
 
 
 def _missing(text: str, given: Sequence[str]) -> str:

@@ -45,7 +45,7 @@ def settled(options: RunOptions, front: Front | None = None) -> tuple[RunOptions
     The simulated machine becomes as fast as the point needs, and rivals get the same machine.
 
     Raises:
-        ConfigError: the point does not fit the resolution.
+        ConfigError: the point does not fit the resolution, or no point keeps the limit.
     """
     asked = next((name for name in CHOICES if getattr(options, name) not in ("", None)), None)
     if asked is None:
@@ -65,6 +65,9 @@ def settled(options: RunOptions, front: Front | None = None) -> tuple[RunOptions
     predicted = {"flops": capacity * options.seconds, "wall_s": place.wall_s * span, "mse": place.mse}
     limits = {"budget_flops": "flops", "budget_seconds": "wall_s", "mse_target": "mse"}
     limit = (limits[asked], float(value)) if asked in limits else None
+    if limit is not None and predicted[limit[0]] > limit[1] * (1.0 + 1e-9):
+        least = f"{1.005 * predicted[limit[0]]:.3g}"  # not below it when it is rounded
+        raise ConfigError(f"{asked}: expected at least {least}, the least of all settings of the front, got {value:g}")
     return found, Choice(f"{asked} {value if isinstance(value, str) else f'{value:g}'}", place, predicted, limit)
 
 

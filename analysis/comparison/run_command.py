@@ -7,8 +7,8 @@ Examples: python scripts/run.py fly-by --seconds 2 --out out/fly-by
 
 from __future__ import annotations
 
-from analysis.command.cli import bad_input, parse, require_unbroken
-from analysis.command.start import first_imports, process_began_s
+from analysis.command.cli import parse, require_unbroken
+from analysis.command.start import process_began_s
 from analysis.comparison.experiment import run_experiment
 from analysis.comparison.options import RunOptions
 
@@ -16,10 +16,7 @@ from analysis.comparison.options import RunOptions
 def main() -> None:
     """Parses, runs, prints the outcome and the place of the files."""
     options = parse(RunOptions, __doc__ or "")
-    with first_imports(), bad_input():
-        from scenes import catalog
-
-        catalog.require_known(options.input)  # before slow imports
+    options.require_found(options.input)
     summary = run_experiment(options, process_began_s())
 
     from analysis.command.console import Table, show

@@ -15,7 +15,7 @@ from __future__ import annotations
 from analysis.command.cli import parse, require_files
 from analysis.command.cluster import ClusterOptions
 from analysis.command.extras import require_extra
-from analysis.perception.options import AdaptiveOptions, StepOptions, StimuliOptions
+from analysis.perception.options import AdaptiveOptions, AnalyseOptions, StepOptions, StimuliOptions
 
 
 def main() -> None:
@@ -23,6 +23,8 @@ def main() -> None:
     options = parse(StepOptions, __doc__ or "")  # type: ignore[arg-type]
     if isinstance(options, AdaptiveOptions):
         require_extra("study")
+    if isinstance(options, AnalyseOptions):
+        require_files(*options.trials)
     if isinstance(options, StimuliOptions):
         require_files(*options.jobs)
         ClusterOptions(scheduler=options.scheduler).require_port()  # before slow imports

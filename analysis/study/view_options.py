@@ -7,6 +7,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
 from analysis.command import limits
+from analysis.command.cli import bad_input, require_files
+from analysis.command.start import first_imports
 from tsar.config import closed_choices, require
 
 if TYPE_CHECKING:
@@ -55,6 +57,21 @@ class ViewOptions:
         )
         one = self.camera is None or self.camera_keys is None
         require(one, "camera_keys", "none beside a camera", str(self.camera_keys))
+
+    def require_found(self, scene: str) -> None:
+        """Checks, before libraries load, that a scene is known and that all files are there.
+
+        Args:
+            scene: name or number of a scene, or a file.
+
+        Raises:
+            InputError: one of them is not.
+        """
+        require_files(*(file for file in (self.environment, self.camera_keys) if file is not None))
+        with first_imports(), bad_input():
+            from scenes import catalog
+
+            catalog.require_known(scene)
 
     @property
     def look(self) -> Look:

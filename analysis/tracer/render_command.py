@@ -20,6 +20,7 @@ def main() -> None:
     """Parses, renders, prints the names of the files."""
     options = parse(RenderOptions, __doc__ or "")
     require_extra(*(("denoise",) if options.denoise else ()))
+    options.require_found(options.scene)
     from analysis.command.console import show
     from analysis.tracer.run import explained, opened, render
 

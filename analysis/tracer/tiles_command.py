@@ -18,6 +18,7 @@ def main() -> None:
     options = parse(TileOptions, __doc__ or "")
     options.farm.require_port()  # before slow imports
     require_extra("study")
+    options.require_found(options.scene)
     import pandas as pd
 
     from analysis.command.console import frame_table, show

@@ -72,7 +72,7 @@ def test_options_are_parsed() -> None:
         (["--tsar.error.norm", "l3"], ["error.norm", "l3", "linf"]),
         (["--count", "1.5"], ["--count: expected a whole number, got '1.5'"]),
         (["--shares", "1", "x", "--count", "2"], ["--shares: expected numbers, got '1', 'x'"]),
-        (["--corner", "1", "x"], ["--corner: expected FLOAT FLOAT, got '1', 'x'"]),
+        (["--corner", "1", "x"], ["--corner: expected 2 numbers, got '1', 'x'"]),
         (["--corner=1"], ["--corner: expected 2 values, got '1'"]),
         (["--kind"], ["--kind: expected a value, got none"]),
         (["--only", "x"], ["--only: expected a whole number, got 'x'"]),
