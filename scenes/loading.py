@@ -13,9 +13,10 @@ from typing import cast
 import numpy as np
 from numpy.typing import NDArray
 
-from scenes.arithmetic import power
+from scenes.arithmetic import power, product
 from scenes.canonical import SceneError
-from scenes.pictures import Pixels, alpha_of, decoded
+from scenes.chromaticities import to_rec709
+from scenes.pictures import Pixels, alpha_of, chromaticities_of, decoded
 
 ASSETS = Path(__file__).parent / "assets"
 
@@ -59,7 +60,8 @@ def state_of(path: Path) -> FileState | None:
 def read_image(path: Path) -> Pixels:
     """Reads an image as linear Rec. 709 RGB.
 
-    Integers of 8 or 16 bits are decoded from sRGB; OpenEXR, Radiance, PFM and floating-point TIFF files are linear.
+    Integers of 8 or 16 bits are decoded from sRGB; OpenEXR, Radiance, PFM and floating-point TIFF files are linear,
+    and become Rec. 709 if OpenEXR or Radiance files name other primaries.
     Infinite values, such as those of a sun beyond half precision, become :data:`RADIANCE_MOST`, with a warning.
 
     Args:
@@ -113,13 +115,26 @@ def _image(path: Path, state: FileState | None) -> tuple[Pixels, bool]:
     try:
         found = decoded(path)
         linear = found.dtype == np.float32
-        pixels = _clamped(cast(Pixels, found), path) if linear else decode_srgb(cast(NDArray[np.uint8], found))
+        pixels = (
+            rec709(_clamped(cast(Pixels, found), path), path) if linear else decode_srgb(cast(NDArray[np.uint8], found))
+        )
     except Exception as error:  # decoders raise arbitrary exceptions on broken files
         raise SceneError(f"texture {path}: cannot be read: {one_line(error)}") from error
     if pixels.ndim != 3 or pixels.shape[2] != 3 or not np.isfinite(pixels).all():
         raise SceneError(f"texture {path}: expected finite RGB pixels (h, w, 3), got shape {pixels.shape}")
     pixels.flags.writeable = False
     return pixels, linear
+
+
+def rec709(pixels: Pixels, path: Path) -> Pixels:
+    """Linear values of a file as Rec. 709, if it names other primaries; negative channels become 0.
+
+    Raises:
+        ValueError: the file cannot be read.
+    """
+    given = chromaticities_of(path)
+    matrix = None if given is None else to_rec709(given)
+    return pixels if matrix is None else np.maximum(product(pixels, matrix.T), 0.0).astype(np.float32)
 
 
 def _clamped(pixels: Pixels, path: Path) -> Pixels:

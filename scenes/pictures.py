@@ -8,17 +8,21 @@ from __future__ import annotations
 
 import warnings
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, BinaryIO
 
 import numpy as np
 from numpy.typing import NDArray
 from PIL import Image
 
+from scenes.radiance import RadianceHeader, header_of
+
 if TYPE_CHECKING:
     from OpenImageIO import ImageBuf
 
 Pixels = NDArray[np.float32]
-_WIDE = (".exr", ".hdr", ".pfm", ".pic", ".png", ".rgbe", ".tif", ".tiff")
+_RADIANCE = (".hdr", ".pic", ".rgbe")
+_WIDE = (".exr", ".pfm", ".png", ".tif", ".tiff", *_RADIANCE)
 
 PIXELS_MOST = 1 << 27
 """Maximum number of pixels of an image, such as 16384 x 8192. A file of a few kilobytes can contain more pixels than
@@ -31,14 +35,50 @@ def decoded(path: Path) -> Pixels | NDArray[np.uint8] | NDArray[np.uint16]:
     Deviation: Radiance files from before 1991, whose run-length encoding repeats whole pixels, are rejected, as in
     other renderers.
 
+    Values of Radiance files are divided by their exposure and colour correction.
+
     Returns:
         ``(height, width, 3)`` float32, uint8 or uint16, row 0 at the top.
 
     Raises:
         ValueError, OSError or other exceptions of the decoders: the file cannot be read.
     """
+    header = _header_of(path)
+    if header is not None:
+        return _radiance(path, header)
     found = _wide(path) if path.suffix.lower() in _WIDE else None
     return by_pillow(path) if found is None else found
+
+
+def chromaticities_of(path: Path) -> tuple[float, ...] | None:
+    """``x`` and ``y`` of red, green, blue and white of an image of linear values; None if the file does not tell them.
+
+    Raises:
+        ValueError or other exceptions of the decoders: the file cannot be read.
+    """
+    if path.suffix.lower() != ".exr":
+        header = _header_of(path)
+        return None if header is None else header.chromaticities
+    found = _opened(path).spec().getattribute("chromaticities")
+    return None if found is None else tuple(map(float, found))
+
+
+def _header_of(path: Path) -> RadianceHeader | None:
+    return header_of(path) if path.suffix.lower() in _RADIANCE else None
+
+
+def _radiance(path: Path, header: RadianceHeader) -> Pixels:
+    """Values of a Radiance file; those of CIE XYZ are not converted."""
+    if header.is_plain:
+        found = _wide(path)
+    else:
+        # the library knows neither all orders of rows and columns nor XYZ
+        with TemporaryDirectory() as folder:
+            plain = Path(folder) / "plain.hdr"
+            plain.write_bytes(header.plain + path.read_bytes()[header.start :])
+            found = _wide(plain)
+    assert found is not None, "values of Radiance files have more than 8 bits"
+    return header.upright(found.astype(np.float32))
 
 
 def _require_size(width: int, height: int) -> None:
@@ -81,8 +121,12 @@ def _three(pixels: np.ndarray) -> np.ndarray:
     return pixels[..., :3] if pixels.shape[-1] >= 3 else np.repeat(pixels[..., :1], 3, axis=-1)
 
 
-def _wide(path: Path) -> Pixels | NDArray[np.uint16] | None:
-    """Values of more than 8 bits; None for 8-bit files."""
+def _opened(path: Path) -> ImageBuf:
+    """An image whose values are read on demand.
+
+    Raises:
+        ValueError: the file cannot be read.
+    """
     import OpenImageIO as oiio  # imported here: its types complain if a process ends before it used any
 
     oiio.attribute("threads", 1)  # threads would not survive a fork
@@ -90,8 +134,16 @@ def _wide(path: Path) -> Pixels | NDArray[np.uint16] | None:
     hints = oiio.ImageSpec()
     hints.attribute("oiio:UnassociatedAlpha", 1)  # colours are not multiplied by alpha
     image = oiio.ImageBuf(str(path), 0, 0, hints)
-    spec = image.spec()
     _require_read(image)
+    return image
+
+
+def _wide(path: Path) -> Pixels | NDArray[np.uint16] | None:
+    """Values of more than 8 bits; None for 8-bit files."""
+    import OpenImageIO as oiio
+
+    image = _opened(path)
+    spec = image.spec()
     if spec.format.basetype in (oiio.UINT8, oiio.INT8):
         return None
     _require_size(spec.width, spec.height)

@@ -9,14 +9,14 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 from PIL import Image
 
 from scenes.canonical import SceneError
 from scenes.formats.losses import LossReport
-from scenes.loading import decode_srgb, fractions, state_of
+from scenes.loading import decode_srgb, fractions, rec709, state_of
 from scenes.models.gltf_textures import BORDER, Lookup, Textures
 from scenes.models.sources import Sources
 from scenes.models.usd_library import Ar
@@ -75,7 +75,7 @@ class Pictures:
 
     def _color(self, path: str, space: str) -> Pixels:
         if (path, space) not in self._colors:
-            given = self._read(path, decoded)
+            given = self._read(path, decoded if space == "raw" else _colors)
             if given.dtype == np.float32 and space == "sRGB":
                 given = np.rint(np.clip(given, 0.0, 1.0) * 65535.0).astype(np.uint16)
             raw = space == "raw" or (space != "sRGB" and not self._is_encoded(path, given))
@@ -106,6 +106,11 @@ class Pictures:
                 return of_file(unpacked)
         except Exception as error:  # decoders raise arbitrary exceptions on broken files
             raise SceneError(f"texture {path}: cannot be read: {' '.join(str(error).split())}") from None
+
+
+def _colors(path: Path) -> np.ndarray:
+    given = decoded(path)
+    return rec709(cast(Pixels, given), path) if given.dtype == np.float32 else given
 
 
 def _is_color(path: Path) -> bool:

@@ -24,6 +24,7 @@ from scenes.catalog import Look, load_seen
 from scenes.formats.losses import LossReport
 from scenes.models import read_whole
 from tests.scenes.models.usd import mesh, written
+from tests.scenes.test_radiance import wide_exr
 
 
 def test_cameras(tmp_path: Path) -> None:
@@ -114,3 +115,11 @@ def test_the_pole_of_a_dome(up: str, pole: tuple[int, ...], tmp_path: Path) -> N
     body = mesh() + 'def DomeLight "a" { }\ndef DomeLight_1 "b" { }\n'
     first, second = read_whole(written(tmp_path, body, up=up)).lights
     assert first.to_world[:3, 1] == pytest.approx((0, 1, 0)) and second.to_world[:3, 1] == pytest.approx(pole)
+
+
+@pytest.mark.parametrize(("space", "expected"), [("", [0.0, 1.1329, 0.0]), ('(colorSpace = "raw")', [0.0, 1.0, 0.0])])
+def test_an_environment_with_other_primaries_becomes_rec_709(space: str, expected: list, tmp_path: Path) -> None:
+    file = wide_exr(tmp_path)
+    dome = f'def DomeLight "d" {{ float inputs:intensity = 1\nasset inputs:texture:file = @{file.name}@ {space} }}\n'
+    (light,) = read_whole(written(tmp_path, mesh() + dome)).lights
+    assert isinstance(light, EnvironmentLight) and light.image[0, 0] == pytest.approx(expected, abs=1e-4)
