@@ -8,13 +8,13 @@ They are written as ``live-1440.webp``, ``live-film.webp``, ``page-1440.webp`` a
 from __future__ import annotations
 
 import argparse
+import contextlib
 import io
 import shutil
 import sys
 import tempfile
 import time
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
 from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
@@ -29,11 +29,11 @@ from analysis.live.options import Controls, LiveOptions
 from analysis.live.server import watching
 
 WAIT_MS = 120_000
-WIDTHS = ((1440, 900), (1024, 1000), (390, 844))
+SIZES_PX = ((1440, 1000), (1024, 1000), (390, 844))
 FILM_PX = (1000, 760)
 
 
-@contextmanager
+@contextlib.contextmanager
 def browser() -> Iterator[Browser]:
     """A Chromium without a window."""
     with sync_playwright() as play:
@@ -43,12 +43,12 @@ def browser() -> Iterator[Browser]:
         started.close()
 
 
-@contextmanager
+@contextlib.contextmanager
 def driven(side_px: int) -> Iterator[tuple[Browser, str]]:
     """A live session of the fly-by, framed beside tsar; a browser, and the address of the page."""
     controls = Controls(left="framed", right="tsar", resolution_px=side_px)
-    with tempfile.TemporaryDirectory() as folder:
-        engine = Engine(LiveOptions("fly-by", controls, out=Path(folder)))
+    with tempfile.TemporaryDirectory() as folder, contextlib.chdir(folder):
+        engine = Engine(LiveOptions("fly-by", controls))
         try:
             with watching(Hub(engine), "fly-by") as address, browser() as started:
                 yield started, address
@@ -79,24 +79,24 @@ def keep(page: Page, file: Path, whole: bool = False) -> None:
 def live(folder: Path) -> None:
     """The live view at three widths: an overlay; dark, a moment that is held; on a phone."""
     with driven(512) as (started, address):
-        page = opened(started, address, WIDTHS[0])
+        page = opened(started, address, SIZES_PX[0])
         page.locator("#o-right").select_option("expected error")
         page.wait_for_function("document.getElementById('right-said').textContent.includes('expected error')")
         page.wait_for_timeout(10_500)  # until the curves are full
         keep(page, folder / "live-1440.webp")
         page.locator("#o-right").select_option("none")
         page.close()
-        page = opened(started, address, WIDTHS[1], "dark")
+        page = opened(started, address, SIZES_PX[1], "dark")
         page.wait_for_timeout(10_500)
         page.locator("#freeze").click()
         page.wait_for_selector("#frozen:not([hidden])", timeout=WAIT_MS)
         page.locator("#o-right").select_option("squared error")
         page.wait_for_timeout(2000)
-        keep(page, folder / "live-1024.webp")
+        keep(page, folder / "live-1024.webp", whole=True)
         page.locator("#freeze").click()
         page.locator("#o-right").select_option("none")
         page.close()
-        page = opened(started, address, WIDTHS[2])
+        page = opened(started, address, SIZES_PX[2])
         page.wait_for_timeout(10_500)
         keep(page, folder / "live-390.webp", whole=True)
 
@@ -118,7 +118,7 @@ def film(folder: Path) -> None:
     lengths = [round(1000 * seconds) for seconds in (*np.diff(times), 2.0)]
     pictures = [Image.open(io.BytesIO(data)).convert("RGB") for _, data in shots]
     file = folder / "live-film.webp"
-    pictures[0].save(file, save_all=True, append_images=pictures[1:], duration=lengths, loop=0, quality=60, method=4)
+    pictures[0].save(file, save_all=True, append_images=pictures[1:], duration=lengths, loop=0, quality=60, method=6)
     print(f"{file}: {len(shots)} pictures in {times[-1] - times[0]:.0f} s")
 
 
@@ -155,7 +155,7 @@ def _act(page: Page, shoot: Callable[[float], None]) -> None:
 def page(folder: Path, report: Path) -> None:
     """The report page at three widths; at 1024 pixels dark, with the squared errors."""
     with browser() as started:
-        for (width, height), scheme in zip(WIDTHS, ("light", "dark", "light"), strict=True):
+        for (width, height), scheme in zip(SIZES_PX, ("light", "dark", "light"), strict=True):
             shown = started.new_page(viewport={"width": width, "height": height}, color_scheme=scheme)
             shown.goto(report.resolve().as_uri(), timeout=WAIT_MS)
             shown.wait_for_timeout(4000)
@@ -177,11 +177,12 @@ def main() -> None:
     parser.add_argument("--out", type=Path, default=Path("docs/pictures"), help="folder for the pictures")
     parser.add_argument("--report", type=Path, default=Path("out/demo/report.html"), help="page of a finished run")
     given = parser.parse_args()
-    given.out.mkdir(parents=True, exist_ok=True)
+    folder = given.out.resolve()
+    folder.mkdir(parents=True, exist_ok=True)
     if given.what == "page":
-        page(given.out, given.report)
+        page(folder, given.report)
     else:
-        {"live": live, "film": film}[given.what](given.out)
+        {"live": live, "film": film}[given.what](folder)
 
 
 if __name__ == "__main__":

@@ -105,11 +105,10 @@ class Hub:
             look, frozen, driver = self.engine.look(), self.frozen, self._driver
             display = replace(self.display, overlay=dict(self.display.overlay))
             note, watcher.note = watcher.note, ""
-        sides: dict[str, Any] = {}
+        sides = {side: self._facts(side, look.runs[side], look.sides[side], look.time_s) for side in SIDES}
         pictures: list[bytes] = []
         for side in SIDES:
-            run, seen = look.runs[side], look.sides[side]
-            facts = self._facts(side, run, seen, look.time_s)
+            run, seen, facts = look.runs[side], look.sides[side], sides[side]
             if seen is not None and run is not None:
                 config = self.engine.controls.config()
                 known = overlays(seen, config, look.time_s)
@@ -123,7 +122,6 @@ class Hub:
                     pixels, facts["scale"] = self._pixels(side, key, seen, known, frozen)
                     facts |= {"height": pixels.shape[0], "width": pixels.shape[1], "bytes": pixels.nbytes}
                     pictures.append(pixels.tobytes())
-            sides[side] = facts
         header = json.dumps(
             {
                 "drives": watcher.number == driver,
@@ -162,7 +160,7 @@ class Hub:
         """What a page is told of a side in numbers; what costs time is taken once of a picture."""
         if run is None:
             return {"name": ""}
-        found: dict[str, Any] = {"name": run.name, "cycles": run.cycles, "busy_s": run.busy_s, "error": run.error}
+        found: dict[str, Any] = {"name": run.name, "cycles": run.cycles, "worked_s": run.worked_s, "error": run.error}
         if seen is not None and seen.shown[1].spent is not None:
             key, values = self._told.get(side, (None, (None, None)))
             if key != (run, seen.number):

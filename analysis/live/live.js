@@ -149,8 +149,8 @@ function said(side, facts, header) {
   if (!before || before.name !== facts.name || header.time_s - before.time > 1 || facts.cycles < before.cycles) {
     const gone = before && before.name === facts.name ? header.time_s - before.time : 0;
     const rate = gone > 0 ? (facts.cycles - before.cycles) / gone : null;
-    const share = gone > 0 ? (facts.busy_s - before.busy_s) / gone : null;
-    rates[side] = { name: facts.name, time: header.time_s, cycles: facts.cycles, busy_s: facts.busy_s, rate, share };
+    const share = gone > 0 ? (facts.worked_s - before.worked_s) / gone : null;
+    rates[side] = { name: facts.name, time: header.time_s, cycles: facts.cycles, worked_s: facts.worked_s, rate, share };
   }
   const { rate, share } = rates[side];
   const pace = rate === null || rate < 0 ? "" : `, ${rate.toFixed(1)} cycles/s with ${Math.round(100 * share)} % of the machine`;

@@ -82,7 +82,7 @@ class Runner:
     Attributes:
         name: of the policy.
         cycles: how many have ended.
-        busy_s: seconds that they have worked, others' turns left out.
+        busy_s: seconds that these cycles have worked, others' turns left out.
         error: why it has ended by itself, in one line; empty while it goes on.
     """
 
@@ -113,6 +113,11 @@ class Runner:
         self._who = turns.join()
         self._thread = threading.Thread(target=self._work, name=f"live {name}", daemon=True)
         self._thread.start()
+
+    @property
+    def worked_s(self) -> float:
+        """Seconds that it has worked so far, also on the cycle that has not ended."""
+        return self._turns.worked(self._who) - self._before_s
 
     def at(self, time_s: float) -> DisplayState | None:
         """What stands on its display; None before the first picture."""
@@ -160,7 +165,7 @@ class Runner:
         display = dataclasses.replace(display, display_time_s=display.sample_time_s + latency * spent.cost_s)
         with self._lock:
             self.cycles += 1
-            self.busy_s = self._turns.worked(self._who) - self._before_s
+            self.busy_s = self.worked_s
             self._ready.append(DisplayState(self.cycles, (record, display)))
             self._drop(self._session.now())
 

@@ -19,6 +19,7 @@ from analysis.live.hub import Hub, Watcher
 from analysis.live.options import Controls
 from analysis.live.overlays import codes
 from analysis.live.requests import replay
+from analysis.live.turns import Turns
 from analysis.metrics.quality import pixel_errors
 from analysis.page.video import to_pixels
 from scenes.sessions import read_session
@@ -104,6 +105,19 @@ def test_pictures_are_sent_once_and_are_those_of_the_displays(hub: Hub) -> None:
         expected = to_pixels(seen.shown[1].image).astype(int)
         assert np.abs(pictures[side].astype(int) - expected).max() <= 1
     assert header["sides"]["left"]["cycle_ms"] > 0.0 and header["sides"]["left"]["age_ms"] > 0.0
+
+
+def test_what_a_side_has_worked_counts_the_cycle_that_goes_on(hub: Hub, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Else cycles of a tenth of a second give shares of the machine that make more than the whole."""
+    watcher, worked = hub.came(), Turns.worked
+    shown(hub, watcher)
+    hub.engine.rest()
+    before, _ = frame(hub, watcher)
+    monkeypatch.setattr(Turns, "worked", lambda turns, who: worked(turns, who) + 2.5)
+    after, _ = frame(hub, watcher)
+    for side in ("left", "right"):
+        assert after["sides"][side]["cycles"] == before["sides"][side]["cycles"]
+        assert after["sides"][side]["worked_s"] - before["sides"][side]["worked_s"] == pytest.approx(2.5)
 
 
 def test_codes_are_those_of_the_display_within_one() -> None:
