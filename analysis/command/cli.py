@@ -218,11 +218,12 @@ def run_process(main: Callable[[], None]) -> None:
 
 
 def _base_of(error: ModuleNotFoundError) -> InputError | None:
-    """The error to report if packages that every command needs are not installed for this Python; else None."""
-    if importlib.util.find_spec("tyro") and importlib.util.find_spec("torch"):
+    """The error to report if a package is not installed for this Python; None for a module within one that is."""
+    name = (error.name or "").partition(".")[0]
+    if not name or name in sys.stdlib_module_names or importlib.util.find_spec(name):
         return None
     return InputError(
-        f"expected the package {error.name}, found none for {sys.executable}; activate the environment in which tsar "
+        f"expected the package {name}, found none for {sys.executable}; activate the environment in which this version "
         "is installed (in a checkout: make demo, then . .venv/bin/activate)"
     )
 

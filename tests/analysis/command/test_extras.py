@@ -81,11 +81,22 @@ def test_the_base_alone_compares_and_explains_every_command(tmp_path: Path) -> N
         run(script, "--help")
 
 
-def test_another_module_that_is_missing_is_a_fault_of_ours(monkeypatch, tmp_path: Path) -> None:
-    monkeypatch.setitem(sys.modules, "pandas", None)
+def test_a_module_of_our_own_that_is_missing_is_a_fault_of_ours(monkeypatch, tmp_path: Path) -> None:
+    monkeypatch.setitem(sys.modules, "analysis.command.console", None)
     monkeypatch.chdir(tmp_path)
-    with pytest.raises(ModuleNotFoundError, match="pandas"):
+    with pytest.raises(ModuleNotFoundError, match=r"analysis\.command\.console"):
         call_script("pointsets.py", monkeypatch)
+
+
+def test_a_package_that_an_environment_of_an_earlier_version_lacks_is_named(
+    monkeypatch, tmp_path: Path, capsys
+) -> None:
+    """Such as one that the base needs since then, also where it is imported late."""
+    (tmp_path / "concave.obj").write_text("v 0 0 0\nv 2 0 0\nv 2 2 0\nv 1 0.5 0\nv 0 2 0\nf 1 2 3 4 5\n")
+    monkeypatch.setitem(sys.modules, "mapbox_earcut", None)
+    status = call_script("render.py", monkeypatch, str(tmp_path / "concave.obj"), "--out", str(tmp_path / "out"))
+    said = capsys.readouterr().err
+    assert status == 2 and one_line(said) and "expected the package mapbox_earcut, found none" in said
 
 
 def test_extras_are_those_of_the_project_file() -> None:
