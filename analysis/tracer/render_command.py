@@ -30,5 +30,6 @@ def main() -> None:
         show(*explained(scene))
         return
     found = render(options, scene)
+    show(*found.get("later_losses", ()))
     counts = f"{found['rendered_now']} rendered now, {found['nonfinite']} values not finite"
     show(f"{options.frames} frames ({counts}) in {options.out}")

@@ -122,6 +122,7 @@ def render(options: RenderOptions, scene: Scene) -> dict[str, Any]:
             stills = [still_path(out, number, ending) for number in range(options.frames)]
             write_film(stills, out / "film.mp4", options.fps)
         found = {"frames": options.frames, "rendered_now": rendered, "nonfinite": nonfinite}
+        found |= {"later_losses": posing.later_losses} if posing.anew else {}
         return write_summary(out, found, options, added, scene=scene.name, device=options.device)
 
 

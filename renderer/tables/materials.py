@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import weakref
 
 import numpy as np
 import torch
@@ -50,6 +51,20 @@ def mip_levels(image: np.ndarray) -> list[np.ndarray]:
     return levels
 
 
+_smaller: dict[int, list[np.ndarray]] = {}
+"""Further levels of images that cannot change, by the id of the image, as long as it lives."""
+
+
+def _levels_of(image: np.ndarray) -> list[np.ndarray]:
+    """The mip map of an image, made once of one that cannot change: scenes of several times share images."""
+    if image.flags.writeable:
+        return mip_levels(image)
+    if id(image) not in _smaller:
+        _smaller[id(image)] = mip_levels(image)[1:]
+        weakref.finalize(image, _smaller.pop, id(image))
+    return [np.ascontiguousarray(image, np.float32), *_smaller[id(image)]]
+
+
 class MaterialTable:
     """Rows of materials, textures and mip levels, and the pool of texels."""
 
@@ -71,7 +86,7 @@ class MaterialTable:
         """Adds an image to the pool; returns the index of its first level and the number of levels."""
         key = (id(image), mipmap)
         if key not in self._image_index:
-            levels = mip_levels(image) if mipmap else [np.ascontiguousarray(image, np.float32)]
+            levels = _levels_of(image) if mipmap else [np.ascontiguousarray(image, np.float32)]
             first = len(self.levels)
             for level in levels:
                 height, width = level.shape[:2]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import asdict, dataclass
 
 from scenes.canonical import Scene, SceneError
@@ -51,6 +51,11 @@ class LossReport:
     def add(self, where: str, what: str, became: str = "left out", picture: bool = True) -> None:
         """Adds a loss."""
         self._losses.setdefault(Loss(where, what, became, picture))
+
+    def include(self, losses: Iterable[Loss]) -> None:
+        """Adds losses of another report."""
+        for loss in losses:
+            self._losses.setdefault(loss)
 
     def hint(self, where: str, what: str, became: str = "left out") -> None:
         """Adds the loss of a hint to a renderer, which does not change the picture."""

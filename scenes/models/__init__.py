@@ -9,7 +9,7 @@ from pathlib import Path
 from scenes.arithmetic import product
 from scenes.canonical import Instance, Material, Matrix, RigidTrack, SceneError
 from scenes.formats.losses import Loss, LossReport
-from scenes.loading import FileState, one_line, state_of
+from scenes.loading import one_line
 from scenes.models.gltf_files import read_gltf
 from scenes.models.model import Model
 from scenes.models.obj_files import read_obj
@@ -38,7 +38,7 @@ _READERS: dict[str, Read] = {
 MODEL_ENDINGS = tuple(_READERS)
 
 _KEPT_MAX = 32
-_Kept = tuple[float, dict[Path, FileState | None], Model, tuple[Loss, ...]]
+_Kept = tuple[float, Sources, Model, tuple[Loss, ...]]
 _kept: dict[tuple[Path, bool, bool], _Kept] = {}
 """Cache of models at their start and at one later time, by path, facets and whether it is later; with the time and the
 files on which each depends."""
@@ -84,23 +84,26 @@ def read_whole(path: Path, report: LossReport | None = None, facets: bool = Fals
     _, _, model, losses = _at(path, facets, 0.0)
     if model.posed and time_s != 0.0:
         _, _, model, losses = _at(path, facets, time_s)
-    for loss in losses:
-        report.add(loss.where, loss.what, loss.became, loss.picture)
+    report.include(losses)
     return model
 
 
 def files_of(path: Path, facets: bool) -> list[Path]:
     """The files that were found for a model; arguments and errors as for :func:`read_whole`."""
-    return sorted(file for file, state in _at(Path(path), facets, 0.0)[1].items() if state is not None)
+    return sorted(file for file, state in _at(Path(path), facets, 0.0)[1].files.items() if state is not None)
 
 
 def _at(path: Path, facets: bool, time_s: float) -> _Kept:
     key = path, facets, time_s != 0.0
-    kept = _kept.pop(key, None)
-    if kept is None or kept[0] != time_s or any(state_of(file) != state for file, state in kept[1].items()):
-        sources, found = Sources(path), LossReport()
+    kept, first = _kept.pop(key, None), _kept.get((path, facets, False))
+    if kept is None or kept[0] != time_s or kept[1].changed:
+        # materials, which take most of the time, are those of the first time
+        sources = Sources(path) if first is None or first[1].changed else first[1]
+        found = LossReport()
         model = _read(path, sources, found, facets, time_s)
-        kept = time_s, sources.files, model, found.losses
+        if not model.posed:
+            sources.kept = None
+        kept = time_s, sources, model, found.losses
     _kept[key] = kept
     if len(_kept) > _KEPT_MAX:
         del _kept[next(iter(_kept))]

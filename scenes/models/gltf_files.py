@@ -47,9 +47,15 @@ def read_gltf(sources: Sources, report: LossReport, facets: bool = False, time_s
     Raises:
         SceneError: the file cannot be read, or requires an unsupported extension.
     """
-    data = GltfData(sources)
+    said: LossReport
+    if sources.kept is None:
+        data, said = GltfData(sources), LossReport()
+        sources.kept = GltfMaterials(data, GltfTextures(data, said), said, facets), data, said
+    materials, data, said = sources.kept
     _check_extensions(data, report)
-    return _Reader(data, report, facets, time_s).model()
+    model = _Reader(data, materials, report, time_s).model()
+    report.include(said.losses)
+    return model
 
 
 def _check_extensions(data: GltfData, report: LossReport) -> None:
@@ -65,9 +71,8 @@ def _check_extensions(data: GltfData, report: LossReport) -> None:
 class _Reader:
     """Reads nodes and meshes, each mesh once."""
 
-    def __init__(self, data: GltfData, report: LossReport, facets: bool, time_s: float) -> None:
-        self.data, self.report, self.pose = data, report, Pose(time_s, report)
-        self.materials = GltfMaterials(data, GltfTextures(data, report), report, facets)
+    def __init__(self, data: GltfData, materials: GltfMaterials, report: LossReport, time_s: float) -> None:
+        self.data, self.report, self.pose, self.materials = data, report, Pose(time_s, report), materials
         self.motion = GltfMotion(data, report)
         self._meshes: dict[tuple[int, Weights], list[_Part]] = {}
         self._parts: list[Instance] = []

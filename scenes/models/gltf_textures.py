@@ -125,6 +125,7 @@ class Textures(ABC):
         if len(kinds) == 1 and wraps[0] in (_CLAMP, BORDER):
             wrap = "clamp" if wraps[0] == _CLAMP else "black"
         kind: Literal["nearest", "mipmap"] = "nearest" if sampler.get("magFilter") == _NEAREST else "mipmap"
+        image.flags.writeable = False
         source = str(self.document.sources.path)
         return ImageTexture(image, (scale[0], scale[1]), (offset[0], offset[1]), wrap, kind, source)
 

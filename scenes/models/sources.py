@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import codecs
 from pathlib import Path
+from typing import Any
 from urllib.parse import unquote
 
 from scenes.canonical import SceneError
@@ -19,11 +20,18 @@ class Sources:
     Attributes:
         path: path of the model.
         files: states of all requested files.
+        kept: what a reader keeps of a file for its other times; None if nothing.
     """
 
     def __init__(self, path: Path) -> None:
         self.path = path
         self.files: dict[Path, FileState | None] = {path: state_of(path)}
+        self.kept: Any = None
+
+    @property
+    def changed(self) -> bool:
+        """Whether a file differs from what was read."""
+        return any(state_of(file) != state for file, state in self.files.items())
 
     def find(self, name: str) -> Path | None:
         """The path of a file name, relative to the model's folder; if the name is a path of another machine, its last

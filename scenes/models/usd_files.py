@@ -107,7 +107,7 @@ class _Reader:
         self.motion = UsdMotion(stage, Pose(time_s, report))
         self.code = self.motion.code
         document = UsdDocument(sources)
-        self.pictures = Pictures(sources)
+        self.pictures = sources.kept = sources.kept or Pictures(sources)
         self.described = UsdMaterials(document, self.pictures, self.motion, report)
         self.materials = GltfMaterials(document, UsdTextures(document, report), report, facets)
         self.instances = PointInstances(stage, self.motion, report)

@@ -7,8 +7,12 @@ from pathlib import Path
 import numpy as np
 import OpenEXR
 import pytest
+from PIL import Image
 
+from renderer.tables import materials
 from scenes import models
+from scenes.models import gltf_textures
+from tests.scenes.models.files import QUAD_UVS
 from tests.scenes.models.test_poses import channel, with_morphs
 from tests.scripts.commands import call_script
 
@@ -69,3 +73,59 @@ def test_a_model_is_read_once(integrator: str, monkeypatch: pytest.MonkeyPatch, 
     options = "--integrator", integrator, *SIZE, "--out", str(tmp_path / "out")
     assert call_script("render.py", monkeypatch, raised(tmp_path), *options) == 0
     assert read == [0.0]
+
+
+@pytest.mark.parametrize("integrator", ["whitted", "path"])
+def test_textures_are_made_once_for_all_frames(
+    integrator: str, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    """Decoded once, and their mip maps made once, with the bytes of stills that are made alone."""
+    Image.fromarray(np.random.default_rng(0).integers(0, 255, (8, 8, 3), np.uint8)).save(tmp_path / "a.png")
+    file = with_morphs(tmp_path)
+    file.attribute("TEXCOORD_0", np.array(QUAD_UVS, np.float32))
+    channel(file, 0, "weights", [0.0, 1.0], np.array([0.0, 0.0, 2.0, 0.0]))
+    texture = {"index": file.texture("a.png")}
+    file.material(pbrMetallicRoughness={"baseColorTexture": texture, "baseColorFactor": [1.0, 0.5, 1.0, 1.0]})
+    model, made = str(file.written()), []
+
+    def counted(place: object, name: str) -> None:
+        real = getattr(place, name)
+        monkeypatch.setattr(place, name, lambda *given: (made.append(name), real(*given))[1])
+
+    counted(gltf_textures, "decoded")
+    counted(materials, "mip_levels")
+
+    def run(name: str, *more: str) -> list[bytes]:
+        options = "--integrator", integrator, *SIZE, *more, "--out", str(tmp_path / name)
+        assert call_script("render.py", monkeypatch, model, *options) == 0
+        return content(tmp_path / name)
+
+    frames = run("film", "--frames", "3", "--fps", "2")
+    assert sorted(made) == ["decoded", "mip_levels"] and len(set(frames)) == 3
+    models._kept.clear()
+    assert run("still", "--time-s", "1") == frames[2:] and len(made) == 4
+    Image.fromarray(np.zeros((8, 8, 3), np.uint8)).save(tmp_path / "a.png")
+    assert run("dark", "--time-s", "1") != frames[2:] and len(made) == 6
+
+
+def test_losses_of_later_frames_are_told_once(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture, tmp_path: Path
+) -> None:
+    file = with_morphs(tmp_path)
+    file.json["nodes"] = [{"mesh": 0}, {"mesh": 0, "name": "vanishing", "translation": [3, 0, 0]}]
+    file.json["scenes"][0]["nodes"] = [0, 1]
+    channel(file, 1, "scale", [0.0, 0.5], np.array([[1, 1, 1], [0, 0, 0]]))
+    options = *SIZE, "--frames", "4", "--fps", "2", "--out", str(tmp_path / "out")
+    assert call_script("render.py", monkeypatch, str(file.written()), *options) == 0
+    said = capsys.readouterr().out
+    assert said.count("vanishing: a node without extent") == 1 and said.count("that scales or shears") == 1
+
+
+def test_images_that_can_change_have_their_mip_maps_made_anew() -> None:
+    image = np.ones((4, 4, 3), np.float32)
+    table = materials.MaterialTable("cpu")
+    table.add_image(image, True)
+    image[:] = 3.0
+    again = materials.MaterialTable("cpu")
+    again.add_image(image, True)
+    assert table.texels[-1].tolist() == [[1.0, 1.0, 1.0]] and again.texels[-1].tolist() == [[3.0, 3.0, 3.0]]
