@@ -35,9 +35,8 @@ def main() -> None:
     if len(sys.argv) not in (2, 3) or Path(sys.argv[1]).exists():
         sys.exit("expected a folder that does not exist, and a revision or nothing")
     folder, revision = Path(sys.argv[1]).resolve(), sys.argv[2] if len(sys.argv) == 3 else "HEAD"
-    commit = subprocess.run(
-        ["git", "rev-parse", revision], cwd=HERE, check=True, capture_output=True, text=True
-    ).stdout.strip()
+    asked = subprocess.run(["git", "rev-parse", revision], cwd=HERE, check=True, capture_output=True)
+    commit = asked.stdout.decode().strip()
     environment = {name: value for name, value in os.environ.items() if name not in ("PYTHONPATH", "VIRTUAL_ENV")}
     environment["WARP_CACHE_PATH"] = str(folder.with_name(f"{folder.name}-kernels"))
     begun, busy = time.monotonic(), psutil.cpu_times()

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
@@ -57,6 +58,17 @@ def show(*parts: Table | str) -> None:
             shown.print(part, soft_wrap=True)
         elif part.rows:
             shown.print(laid_out(part))
+
+
+def written_to(out: Path, files: str) -> list[str]:
+    """The last lines of a command: its files, and where to look at their page if they have one.
+
+    Args:
+        out: folder of the files.
+        files: their names, separated by commas.
+    """
+    page = (out / "report.html").resolve().as_uri()
+    return [f"written to {out}: {files}", *([f"look at it: {page}"] if "report.html" in files else [])]
 
 
 def laid_out(table: Table) -> RichTable:

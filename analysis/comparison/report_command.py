@@ -17,7 +17,7 @@ def main() -> None:
     with bad_input():  # before slow imports
         for folder in named_folders(options.folders).values():
             read_summary(folder)
-    from analysis.command.console import show
+    from analysis.command.console import show, written_to
     from analysis.comparison.days import finished_runs, outcome_table, page_of
     from analysis.page.report import write_report
     from analysis.storage.results import own_results
@@ -31,4 +31,4 @@ def main() -> None:
     for run in runs:
         if run.lack:
             show(run.lack)
-    show(outcome_table(runs), f"written to {options.out}: report.html")
+    show(outcome_table(runs), *written_to(options.out, "report.html"))

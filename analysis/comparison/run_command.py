@@ -19,7 +19,7 @@ def main() -> None:
     options.require_found(options.input)
     summary = run_experiment(options, process_began_s())
 
-    from analysis.command.console import Table, show
+    from analysis.command.console import Table, show, written_to
     from analysis.comparison.tables import run_tables, said_of
 
     rows = {}
@@ -40,7 +40,6 @@ def main() -> None:
         from analysis.comparison.choosing import choice_table
 
         parts.append(choice_table(summary["choice"]))
-    page = (options.out / "report.html").resolve().as_uri()
     parts += [options.pace] if options.pace else []
-    show(*parts, f"written to {options.out}: {files}", f"look at it: {page}")
+    show(*parts, *written_to(options.out, files))
     require_unbroken([] if checked is None or checked["ok"] else [options.input])

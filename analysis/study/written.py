@@ -10,7 +10,7 @@ from typing import Any, Protocol
 import pandas as pd
 
 from analysis.command.cli import full_disk, require_unbroken
-from analysis.command.console import Table, markdown, show
+from analysis.command.console import Table, markdown, show, written_to
 from analysis.storage.files import write_json, write_table, write_text
 from analysis.storage.results import SUMMARY
 from analysis.storage.summary import with_source
@@ -45,7 +45,8 @@ def end_study(summary: Mapping[str, Any], broken: Sequence[str], out: Path, file
     Raises:
         BrokenInvariants: ``broken`` names results whose cycles broke an invariant.
     """
-    show(f"{summary['runs_done']} of {summary['runs']} runs; written to {out}: {SUMMARY}, {files}")
+    written, *page = written_to(out, f"{SUMMARY}, {files}")
+    show(f"{summary['runs_done']} of {summary['runs']} runs; {written}", *page)
     require_unbroken(broken)
     if summary["failures"]:
         sys.exit(1)

@@ -145,6 +145,7 @@ def test_without_the_policy_thesis_nothing_is_said_of_it(
     where = ("--out", str(tmp_path), "--references", str(tmp_path))
     assert call_script("suitability.py", monkeypatch, *sizes, *named, *where) == 0
     shown, page = capsys.readouterr().out, (tmp_path / "report.html").read_text()
+    assert f"look at it: {(tmp_path / 'report.html').as_uri()}" in shown
     assert "Error of policies beside framed (F)" in shown and "<title>Suitability of tsar" in page
     for text in (shown, page, (tmp_path / "tables.md").read_text()):
         assert "tsar" in text and not re.search("thesis better|ours \\(thesis\\)|policy thesis|Agreement", text)

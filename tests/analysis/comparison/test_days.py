@@ -10,9 +10,10 @@ import numpy as np
 import pytest
 
 from analysis.comparison.days import finished_runs, outcome_table, page_of
-from analysis.page.comparer import Comparer, Panel, Step
+from analysis.page.comparer import Comparer, Panel, Step, read_comparer
 from analysis.page.report import Report, write_report
 from tests.analysis.builders import png_bytes
+from tests.scripts.commands import call_script
 
 TIMES_S = [0.0, 0.1, 0.2]
 
@@ -51,6 +52,15 @@ def test_runs_stand_side_by_side_with_their_differences(tmp_path: Path) -> None:
     assert ratios.curves[0].values == pytest.approx([0.4] * 3)
     assert [row[0] for row in page.tables[0].rows] == ["tsar.seed"] and page.tables[1].rows[0][0] == "commit"
     assert [row[3] for row in outcome_table(runs).rows] == ["—", "0.500", "—", "0.200"]
+
+
+def test_the_command_takes_several_folders_and_says_where_its_page_is(tmp_path: Path, monkeypatch, capsys) -> None:
+    folders = [str(left(tmp_path / name, 0.05, seed=seed)) for seed, name in enumerate("abc")]
+    assert call_script("report.py", monkeypatch, *folders, "--out", str(tmp_path / "all")) == 0
+    page = tmp_path / "all" / "report.html"
+    assert f"look at it: {page.as_uri()}" in capsys.readouterr().out
+    shown = read_comparer(page)
+    assert {f"{name}: tsar" for name in "abc"} <= {panel.label for panel in shown.panels}
 
 
 def test_other_references_and_shorter_runs_keep_their_own(tmp_path: Path) -> None:
