@@ -16,6 +16,7 @@ import tempfile
 import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
+from typing import Literal
 
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
 
@@ -56,7 +57,7 @@ def driven(side_px: int) -> Iterator[tuple[Browser, str]]:
             engine.close()
 
 
-def opened(started: Browser, address: str, size: tuple[int, int], scheme: str = "light") -> Page:
+def opened(started: Browser, address: str, size: tuple[int, int], scheme: Literal["light", "dark"] = "light") -> Page:
     """The live page, once both sides have been shown for a while."""
     width, height = size
     context = started.new_context(viewport={"width": width, "height": height}, bypass_csp=True, color_scheme=scheme)
