@@ -17,8 +17,9 @@ from numpy.typing import NDArray
 from scenes.formats.mitsuba.write_materials import BLUNT
 
 # A file of Mitsuba 0.5 is upgraded to Mitsuba 3 by editing its tree, without this project's importer, so that its
-# picture is an independent reference. Version 3 renames most properties itself. Its blend with a perfect mirror or
-# glass loses light, which that of 0.5 does not: there both get facets of a small alpha.
+# picture is an independent reference. Version 3 renames most properties itself, but moves texture coordinates before it
+# scales them, which 0.5 does after. Its blend with a perfect mirror or glass loses light, which that of 0.5 does not:
+# there both get facets of a small alpha.
 _MITSUBA = (
     f"BLUNT = {BLUNT}"
     + """
@@ -40,6 +41,18 @@ for blend in root.iter("bsdf"):
         if node.get("type") in ("conductor", "dielectric"):
             node.set("type", "rough" + node.get("type"))
             node.append(E.Element("float", name="alpha", value=str(BLUNT)))
+
+for texture in root.iter("texture") if old else ():
+    given = {part.get("name"): part for part in texture if part.tag == "float"}
+    sizes = [given.get(name, given.get("uvscale")) for name in ("uscale", "vscale")]
+    moves = [given.get(name) for name in ("uoffset", "voffset")]
+    if any(part is not None for part in sizes + moves):
+        for name in {"uscale", "vscale", "uvscale", "uoffset", "voffset"} & set(given):
+            texture.remove(given[name])
+        placing = E.SubElement(texture, "transform", name="to_uv")
+        for kind, parts, none in (("scale", sizes, "1"), ("translate", moves, "0")):
+            x, y = (none if part is None else part.get("value") for part in parts)
+            E.SubElement(placing, kind, x=x, y=y)
 
 for parent in list(root.iter()):
     for node in list(parent):

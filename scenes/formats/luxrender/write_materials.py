@@ -8,6 +8,7 @@ from __future__ import annotations
 import math
 
 import numpy as np
+from numpy.typing import NDArray
 
 from scenes.canonical import (
     Bumped,
@@ -33,6 +34,7 @@ from scenes.formats.appearance.indices import reflectance_of_index
 from scenes.formats.appearance.mixtures import NOTHING, added_coat, dimmed, is_nothing, lets_through, lobes_of
 from scenes.formats.appearance.spectra import METALS, grey, rgb
 from scenes.formats.directives.surface_writer import SurfaceWriter, mixture_line
+from scenes.formats.directives.textures import Pair
 from scenes.formats.geometry.conventions import first_row_below
 from scenes.formats.text.numbers import listed, number
 
@@ -49,12 +51,33 @@ class LuxSurfaceWriter(SurfaceWriter):
     _null: Matte | None = None
 
     def image_line(self, texture: ImageTexture) -> str:
-        file = self.output.picture(texture.image, texture.source, (".exr",))
-        if texture.filter == "nearest" and texture.image.shape[:2] != (1, 1):
-            self.report.add(f"texture {texture.source or 'picture'}", "texels with sharp edges", "blended in LuxCore")
+        image, scale, offset = self._placed_alike(texture)
+        file = self.output.picture(image, texture.source, (".exr",))
         levels = {"nearest": "nearest", "bilinear": "bilinear", "mipmap": "mipmap_ewa"}[texture.filter]
         more = f'"string filtertype" [ "{levels}" ] "float gamma" [ 1 ] '
-        return self.placed_image(file, texture, more, *first_row_below(texture.uv_scale, texture.uv_offset))
+        return self.placed_image(file, texture, more, scale, offset)
+
+    def _placed_alike(self, texture: ImageTexture) -> tuple[NDArray[np.float32], Pair, Pair]:
+        """Image, scale and offset with which LuxRender and LuxCore draw a texture alike, as far as there are any.
+
+        LuxCore 2.10 takes the offset along u for both directions, always repeats images and always blends texels. The
+        rows of an image that is repeated are moved, so that both offsets are the same.
+        """
+        where, image = f"texture {texture.source or 'picture'}", texture.image
+        scale, offset = first_row_below(texture.uv_scale, texture.uv_offset)
+        if image.shape[:2] == (1, 1):
+            return image, scale, offset
+        if texture.filter == "nearest":
+            self.report.add(where, "texels with sharp edges", "blended in LuxCore")
+        if texture.wrap != "repeat":
+            self.report.add(where, f"what lies beyond the edges of a picture ({texture.wrap})", "repeated in LuxCore")
+        rows = (offset[1] - offset[0]) * len(image)
+        if texture.wrap == "repeat" and abs(rows - round(rows)) < 1e-3:
+            if round(rows) % len(image):
+                image, offset = np.roll(image, -round(rows), axis=0), (offset[0], offset[0])
+        elif abs(rows - len(image) * round(rows / len(image))) > 1e-3:
+            self.report.add(where, "an offset along v that is not that along u", "that along u in LuxCore")
+        return image, scale, offset
 
     def material_line(self, material: Material, name: str) -> str:
         where = f"material {name!r}"

@@ -78,8 +78,10 @@ class ElementWriter:
         if isinstance(texture, ImageTexture):
             made = self.plugin("texture", "bitmap", parent, name=self.name(name))
             self.put(made, "string", "filename", self.output.picture(texture.image, texture.source))
-            self.put(made, "string", "wrapMode", "clamp" if texture.wrap == "black" and self.modern else
-                     {"repeat": "repeat", "clamp": "clamp", "black": "zero"}[texture.wrap])  # fmt: skip
+            beyond = {"repeat": "repeat", "clamp": "clamp", "black": "clamp" if self.modern else "zero"}[texture.wrap]
+            self.put(made, "string", "wrapMode", beyond)
+            if self.modern and texture.wrap == "black":
+                self.report.add(name, "a picture that is black beyond its border", "the colours of its border")
             kind = {"nearest": "nearest", "bilinear": "trilinear", "mipmap": "ewa"}[texture.filter]
             if texture.filter == "bilinear" and not self.modern:
                 self.report.add(name, "a texture without levels of detail", "trilinear")

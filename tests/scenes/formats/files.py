@@ -56,9 +56,10 @@ def reflectances(scene: Scene) -> list[tuple[float, ...]]:
     return [one.material.reflectance.value for one in scene.instances]  # type: ignore[union-attr]
 
 
-def seen(program: str, file: Path, size: int, samples: int) -> np.ndarray:
+def seen(program: str, file: Path, size: int | tuple[int, int], samples: int) -> np.ndarray:
     pytest.importorskip({"mitsuba": "mitsuba", "luxcore": "pyluxcore"}[program])
-    picture = rendered(program, file, file.with_suffix(".npy"), (size, size), samples, 300.0)
+    shape_px = size if isinstance(size, tuple) else (size, size)
+    picture = rendered(program, file, file.with_suffix(".npy"), shape_px, samples, 300.0)
     assert not isinstance(picture, str), picture
     return picture
 
