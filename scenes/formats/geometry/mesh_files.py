@@ -6,6 +6,7 @@ Source: Mitsuba 0.5 documentation, section on the serialized shape; OBJ by the m
 from __future__ import annotations
 
 import io
+import re
 import struct
 import zlib
 from collections.abc import Container, Iterator
@@ -17,12 +18,13 @@ from scenes.formats.geometry.ply_files import checked_mesh
 from scenes.loading import one_line
 
 _MAGIC = 0x041C
-_NORMALS, _UVS, _COLORS, _SINGLE, _DOUBLE = 0x1, 0x2, 0x8, 0x1000, 0x2000
+_NORMALS, _UVS, _COLORS, _FACETED, _SINGLE, _DOUBLE = 0x1, 0x2, 0x8, 0x10, 0x1000, 0x2000
+_HAS_NORMALS = re.compile(rb"^[ \t]*vn[ \t]", re.MULTILINE)
 _BYTES_MAX = 2 << 30
 
 
 def read_obj(content: bytes, name: str) -> Mesh:
-    """An OBJ file as one mesh; without normals it gets smooth ones, as in Mitsuba.
+    """An OBJ file as one mesh.
 
     Raises:
         SceneError: the file cannot be read, or has no faces.
@@ -34,7 +36,7 @@ def read_obj(content: bytes, name: str) -> Mesh:
         mesh = mesh.to_mesh() if isinstance(mesh, trimesh.Scene) else mesh
         uvs = getattr(mesh.visual, "uv", None)
         arrays = np.array(mesh.vertices, np.float64), np.array(mesh.faces, np.float64)
-        normals = np.array(mesh.vertex_normals, np.float64)
+        normals = np.array(mesh.vertex_normals, np.float64) if _HAS_NORMALS.search(content) else None
     except Exception as error:  # parsers raise arbitrary exceptions on broken files
         raise SceneError(f"{name}: cannot be read as OBJ: {one_line(error)[:200]}") from None
     if not len(arrays[1]):
@@ -65,8 +67,8 @@ def _obj_lines(content: bytes) -> Iterator[tuple[str, bool, bytes]]:
         yield name, keyword == b"f", line
 
 
-def read_serialized(content: bytes, index: int, name: str) -> Mesh:
-    """One mesh of a serialized file.
+def read_serialized(content: bytes, index: int, name: str, smooth: bool = False) -> Mesh:
+    """One mesh of a serialized file; the faces of one that asks for flat ones share no vertices, unless ``smooth``.
 
     Raises:
         SceneError: it is not such a file, or does not match its header.
@@ -83,14 +85,14 @@ def read_serialized(content: bytes, index: int, name: str) -> Mesh:
         raise SceneError(f"{name}: expected a mesh at byte {start}")
     try:
         body = zlib.decompressobj().decompress(content[start + 4 :], _BYTES_MAX)
-        return _serialized_mesh(body, version, name)
+        return _serialized_mesh(body, version, name, smooth)
     except (zlib.error, struct.error, ValueError) as error:
         if isinstance(error, SceneError):
             raise
         raise SceneError(f"{name}: cannot be read as a serialized mesh ({one_line(error)})") from None
 
 
-def _serialized_mesh(body: bytes, version: int, name: str) -> Mesh:
+def _serialized_mesh(body: bytes, version: int, name: str, smooth: bool) -> Mesh:
     (flags,) = struct.unpack_from("<I", body)
     at = 4 if version < 4 else body.index(b"\0", 4) + 1
     vertices, triangles = struct.unpack_from("<QQ", body, at)
@@ -109,4 +111,9 @@ def _serialized_mesh(body: bytes, version: int, name: str) -> Mesh:
     rest = iter(columns[1:])
     normals = next(rest) if flags & _NORMALS else None
     uvs = next(rest) if flags & _UVS else None
-    return checked_mesh(columns[0], faces, normals, uvs, name)
+    mesh = checked_mesh(columns[0], faces, normals, uvs, name)
+    if smooth or not flags & _FACETED:
+        return mesh
+    corners = mesh.faces.reshape(-1)
+    apart = np.arange(len(corners), dtype=np.int32).reshape(-1, 3)
+    return Mesh(mesh.vertices[corners], apart, None, None if mesh.uvs is None else mesh.uvs[corners], name)

@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Callable
-from pathlib import Path
 
 import numpy as np
 
@@ -22,7 +21,6 @@ from scenes.canonical import (
     Material,
     Matte,
     Medium,
-    Mesh,
     Rectangle,
     Rgb,
     SceneError,
@@ -34,15 +32,14 @@ from scenes.formats.appearance.folding import mean_of
 from scenes.formats.appearance.mixtures import BLACK, NOTHING, is_nothing
 from scenes.formats.appearance.spectra import grey
 from scenes.formats.geometry import revolution
-from scenes.formats.geometry.mesh_files import obj_materials, obj_part, read_obj, read_serialized
 from scenes.formats.geometry.meshed import as_mesh, depends_on_uv, mitsuba_cube, mitsuba_disk, turned_over
-from scenes.formats.geometry.orientation import FLIPPED, facing_normals
-from scenes.formats.geometry.ply_files import read_ply
+from scenes.formats.geometry.orientation import FLIPPED
 from scenes.formats.geometry.recognition import shape_of
 from scenes.formats.geometry.transform_stack import motion, moved_by, translation
 from scenes.formats.losses import LossReport
 from scenes.formats.mitsuba.curves import curves_of, sized
 from scenes.formats.mitsuba.media import MitsubaMedia
+from scenes.formats.mitsuba.meshes import MitsubaMeshes
 from scenes.formats.mitsuba.properties import Properties
 from scenes.formats.mitsuba.read_materials import MitsubaSurfaces
 from scenes.formats.text.scene_files import SceneFiles
@@ -52,7 +49,6 @@ _SHAPES = ("sphere", "rectangle", "cube", "disk", "cylinder", "obj", "ply", "ser
            "hair")  # fmt: skip
 _CURVES = {"bsplinecurve": "bspline", "linearcurve": "linear", "hair": "linear"}
 _LEFT_OUT = ("heightfield", "deformable", "sdfgrid", "ellipsoids", "ellipsoidsmesh")
-_FLAT = ("rectangle", "disk")
 _DEFAULT = Matte(ConstantTexture(grey(0.5)))
 
 
@@ -70,10 +66,8 @@ class MitsubaShapes:
         self.files, self.report, self.surfaces, self.media, self.find = files, report, surfaces, media, find
         self.groups: dict[int, list[Instance]] = {}
         self.modern = False
-        self._meshes: dict[tuple, Mesh] = {}
+        self.meshes = MitsubaMeshes(files, report)
         self._read_curves: dict[tuple, Curves] = {}
-        self._contents: dict[Path, bytes] = {}
-        self._used: dict[Path, list[str]] = {}
 
     def read(self, node: XmlNode) -> list[Instance]:
         """Instances of a shape: one, those of a group, or none if it is left out, which is reported."""
@@ -109,15 +103,15 @@ class MitsubaShapes:
                 self.report.hint(properties.where, "the border of a medium, which is invisible")
                 continue
             faces = {name} if name is not None else set(used) - set(surfaces)
-            made = self._made(kind, properties, material, faces if len(surfaces) > 1 else None)
+            made = self._made(kind, properties, material, faces if len(surfaces) > 1 else None, keys[0])
             if made is None:
                 return []
-            shape, local = made
+            shape, local, kept = made
             if isinstance(shape, Curves):
                 shape, keys = sized(shape, keys)
             turn_over, place = properties.truth("flipNormals", False), product(keys[0], local)
             inside, outside = sides
-            if self.modern and kind not in _FLAT and determinant(keys[0]) < 0.0:  # as measured with Mitsuba 3.9
+            if self.modern and kept and determinant(keys[0]) < 0.0:  # as measured with Mitsuba 3.9
                 has_sides = turn_over or emission is not None or one_sided or isinstance(material, Glass)
                 if isinstance(shape, Sphere) and has_sides:
                     turn_over = not turn_over
@@ -162,13 +156,7 @@ class MitsubaShapes:
         """
         if self.modern or not any(child.tag in ("bsdf", "ref") and child.get("name") for child in properties.rest):
             return []
-        path = self.files.known(properties.text("filename", ""), properties.where, LossReport(), "", "")
-        if path is None:
-            return []
-        if path not in self._contents:
-            self._contents[path] = self.files.read(path, properties.where)
-            self._used[path] = obj_materials(self._contents[path])
-        return self._used[path]
+        return self.meshes.materials_of(properties)
 
     def _inside(
         self, properties: Properties, used: list[str]
@@ -226,32 +214,33 @@ class MitsubaShapes:
         return found.get("interior"), found.get("exterior")
 
     def _made(
-        self, kind: str, properties: Properties, material: Material, faces: set[str] | None
-    ) -> tuple[Shape, Matrix] | None:
+        self, kind: str, properties: Properties, material: Material, faces: set[str] | None, to_world: Matrix
+    ) -> tuple[Shape, Matrix, bool] | None:
+        """The shape, its place in the shape's space, and whether a reflection leaves its outside where it is."""
         where, place = properties.where, np.eye(4)
         if kind == "sphere":
             radius = properties.number("radius", 1.0)
             if not radius > 0.0:
                 raise SceneError(f"{where}: radius: expected a positive number, got {radius:g}")
             place = translation(*properties.vector("center", grey(0.0)).tolist())
-            return Sphere(radius), product(place, FLIPPED) if depends_on_uv(material) else place
+            return Sphere(radius), product(place, FLIPPED) if depends_on_uv(material) else place, True
         if kind in ("rectangle", "cube", "disk"):
             shapes = {"rectangle": Rectangle(), "cube": Cube(), "disk": Disk()}
             if not depends_on_uv(material) or kind == "rectangle":
-                return shapes[kind], place
+                return shapes[kind], place, kind == "cube"
             mesh = mitsuba_cube() if kind == "cube" else mitsuba_disk()
             if kind == "disk":
                 self.report.add(where, "a textured disk", f"a mesh of {len(mesh.faces)} triangles")
-            return mesh, place
+            return mesh, place, kind == "cube"
         if kind == "cylinder":
             return self._cylinder(properties)
         if kind in _CURVES:
             found = curves_of(properties, _CURVES[kind], self.files, self._read_curves)
-            return None if found is None else (found, place)
-        mesh = self._file(kind, properties, faces, material is _DEFAULT)
-        return None if mesh is None else shape_of(mesh, material, where, self.report)
+            return None if found is None else (found, place, True)
+        found = self.meshes.placed(kind, properties, faces, to_world, material is _DEFAULT, self.modern)
+        return None if found is None else (*shape_of(found[0], material, where, self.report), found[1])
 
-    def _cylinder(self, properties: Properties) -> tuple[Shape, Matrix]:
+    def _cylinder(self, properties: Properties) -> tuple[Shape, Matrix, bool]:
         first, last = properties.vector("p0", grey(0.0)), properties.vector("p1", (0.0, 0.0, 1.0))
         radius, length = properties.number("radius", 1.0), norm(last - first)
         if not (radius > 0.0 and length > 0.0):
@@ -263,31 +252,4 @@ class MitsubaShapes:
         place[:3] = np.stack([side, np.cross(axis, side), axis, first], axis=1)
         mesh = revolution.cylinder(radius, 0.0, length)
         self.report.add(properties.where, "shape 'cylinder'", f"a mesh of {len(mesh.faces)} triangles")
-        return mesh, place
-
-    def _file(self, kind: str, properties: Properties, faces: set[str] | None, bare: bool) -> Mesh | None:
-        """The mesh of a file, or None if it is missing; ``faces`` are the materials of the faces to keep."""
-        name = properties.text("filename", "")
-        path = self.files.known(name, properties.where, self.report, f"the mesh {name!r}", "left out")
-        if path is None:
-            return None
-        index = properties.whole("shapeIndex", 0, 0, 1 << 20) if kind == "serialized" else 0
-        faceted, flipped = properties.truth("faceNormals", False), properties.truth("flipTexCoords", kind == "obj")
-        if properties.number("maxSmoothAngle", 0.0):
-            self.report.add(properties.where, "maxSmoothAngle of a mesh", "its normals as they are")
-        key = (path, index, faceted, flipped, None if faces is None else tuple(sorted(faces)))
-        if key not in self._meshes:
-            content = self._contents.get(path) or self.files.read(path, properties.where)
-            if kind == "obj" and bare and not self.modern and b"mtllib" in content:
-                self.report.add(properties.where, "materials of the library of a mesh", "grey, matte")
-            content = content if faces is None else obj_part(content, faces)
-            if kind == "serialized":
-                mesh = read_serialized(content, index, str(path))
-            else:
-                mesh = read_obj(content, str(path)) if kind == "obj" else read_ply(content, str(path))
-            uvs = mesh.uvs
-            if uvs is not None and flipped:
-                uvs = np.stack([uvs[:, 0], 1.0 - uvs[:, 1]], axis=1).astype(np.float32)
-            mesh = facing_normals(mesh) if not faceted else mesh
-            self._meshes[key] = Mesh(mesh.vertices, mesh.faces, None if faceted else mesh.normals, uvs, str(path))
-        return self._meshes[key]
+        return mesh, place, True

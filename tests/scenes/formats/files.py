@@ -64,7 +64,7 @@ def seen(program: str, file: Path, size: int | tuple[int, int], samples: int) ->
     return picture
 
 
-def drawn(scene: Scene, program: str, folder: Path, size: int = 32, samples: int = 16) -> np.ndarray:
+def drawn(scene: Scene, program: str, folder: Path, size: int | tuple[int, int] = 32, samples: int = 16) -> np.ndarray:
     to, ending = {"mitsuba": ("mitsuba3", ".xml"), "luxcore": ("luxrender", ".lxs")}[program]
     save_scene_file(scene, folder / f"a{ending}", to)
     return seen(program, folder / f"a{ending}", size, samples)
