@@ -33,7 +33,7 @@ from scenes.formats.appearance.mixtures import BLACK, NOTHING, is_nothing
 from scenes.formats.appearance.spectra import grey
 from scenes.formats.geometry import revolution
 from scenes.formats.geometry.meshed import as_mesh, depends_on_uv, mitsuba_cube, mitsuba_disk, turned_over
-from scenes.formats.geometry.orientation import FLIPPED
+from scenes.formats.geometry.orientation import FLIPPED, scales_evenly
 from scenes.formats.geometry.recognition import shape_of
 from scenes.formats.geometry.transform_stack import motion, moved_by, translation
 from scenes.formats.losses import LossReport
@@ -110,6 +110,10 @@ class MitsubaShapes:
             if isinstance(shape, Curves):
                 shape, keys = sized(shape, keys)
             turn_over, place = properties.truth("flipNormals", False), product(keys[0], local)
+            if kind == "sphere" and not scales_evenly(keys[0][:3, :3]):
+                self.report.add(
+                    properties.where, "a sphere that a transform stretches", "stretched; Mitsuba's is round"
+                )
             inside, outside = sides
             if self.modern and kept and determinant(keys[0]) < 0.0:  # as measured with Mitsuba 3.9
                 has_sides = turn_over or emission is not None or one_sided or isinstance(material, Glass)

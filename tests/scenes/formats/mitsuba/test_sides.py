@@ -49,3 +49,12 @@ def test_a_lamp_that_faces_the_other_way_is_a_rectangle(tmp_path: Path) -> None:
     (lamp,) = load_scene_file(tmp_path / "a.xml").instances
     assert isinstance(lamp.shape, Rectangle)
     np.testing.assert_array_equal(lamp.to_world[:3, 2:].T, [[0.0, 0.0, -1.0], [1.0, 0.0, 0.0]])
+
+
+def test_stretched_spheres_are_round_in_mitsuba(tmp_path: Path) -> None:
+    place = '<transform name="to_world"><scale x="2"/></transform>'
+    (tmp_path / "a.xml").write_text(f'{VIEW}<shape type="sphere">{place}{PARTS["both"]}</shape></scene>')
+    report = LossReport()
+    load_scene_file(tmp_path / "a.xml", None, report)
+    (loss,) = report.losses
+    assert loss.what == "a sphere that a transform stretches" and loss.picture
