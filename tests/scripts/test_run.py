@@ -101,6 +101,7 @@ def test_every_result_is_there(folder: Path, printed: str) -> None:
     files = {"comparison.mp4", "error.png", "error.svg", "report.html", "steps.parquet", "summary.json"}
     assert set(found) == files | {"files.journal", "frames"}
     assert all(name in printed for name in files)
+    assert f"look at it: {(folder / 'out' / 'report.html').as_uri()}" in printed
     with Image.open(folder / "out" / "error.png") as picture:
         assert min(picture.size) > 200
     page = (folder / "out" / "report.html").read_text()
@@ -141,6 +142,13 @@ def test_work_is_accounted_for(summary: dict[str, Any], folder: Path) -> None:
     assert stages <= set(summary["stage_wall_s"]) and stages == set(summary["stage_flops"])
     assert min(summary["stage_wall_s"].values()) > 0.0
     assert sum(summary["stage_flops"].values()) == pytest.approx(cycles * summary["cycle_s"] * 3e10)
+
+
+def test_how_long_each_part_took_is_told(done: subprocess.CompletedProcess[str]) -> None:
+    for part, count in (("reference", IMAGES), ("comparison", IMAGES), ("film", None)):
+        assert re.search(
+            rf"(?m)^{part} .* {count or '[0-9]+'}/{count or '[0-9]+'} +[0-9]+:[0-9]{{2}}:[0-9]{{2}} ", done.stderr
+        ), part
 
 
 def test_the_time_to_the_first_cycle_is_told(
@@ -201,6 +209,8 @@ def test_the_reference_is_rendered_once(folder: Path, again: tuple[dict[str, Any
 def test_options_leave_out_what_they_say(folder: Path, again: tuple[dict[str, Any], int]) -> None:
     assert not (folder / "again" / "comparison.mp4").exists() and not (folder / "again" / "frames").exists()
     assert json.loads((folder / "again" / "summary.json").read_text()) == again[0]
+    named = {*again[0]["files"], "summary.json", "files.journal", ".owner"}
+    assert named == {path.name for path in (folder / "again").iterdir()}, "no file is named that was not written"
 
 
 # --- what cannot be run ----------------------------------------------------------------------------------------------
