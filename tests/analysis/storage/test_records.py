@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable
+from fnmatch import fnmatch
 from pathlib import Path
 
 import numpy as np
@@ -43,6 +45,17 @@ def test_records_stream_to_disk_and_come_back(tmp_path: Path) -> None:
         assert row["error_spatial"] == [0.5] * ELEMENTS and row["error_temporal"] == [-0.25] * ELEMENTS
         assert (row["stage_tracing_s"], row["stage_error_s"]) == (0.5, 0.25)
         assert (row["count_primary_rays"], row["count_shadow_rays"]) == (1024, 10)
+
+
+def test_the_columns_are_those_that_the_guide_lists(tmp_path: Path) -> None:
+    guide = (Path(__file__).resolve().parents[3] / "docs/guides/compare.md").read_text(encoding="utf-8")
+    _, _, table = guide.partition("| column | values | what |\n|---|---|---|\n")
+    listed = [
+        name for row in table.split("\n\n")[0].splitlines() for name in re.findall(r"`([^`]+)`", row.split("|")[1])
+    ]
+    written = pq.read_schema(write(tmp_path / "steps.parquet", [good_record(0)])).names
+    assert [name for name in written if not any(fnmatch(name, one) for one in listed)] == []
+    assert [one for one in listed if not any(fnmatch(name, one) for name in written)] == []
 
 
 @pytest.mark.parametrize("added", [0, 1, 9])
