@@ -68,7 +68,8 @@ REFUSED: dict[str, tuple[str, ...]] = {
     "perception recover --jnds 1000": ("jnds", "between 1 and 512", "1000"),
     "perception analyse nowhere.parquet": ("nowhere.parquet", "cannot be read"),
     "perception serve ' '": ("observer", "a name"),
-    "perception sing": ("sing",),
+    "perception sing": ("expected one of stimuli, simulate", "got 'sing'"),
+    "perception stimulii": ("expected one of stimuli, simulate", "got 'stimulii' (nearest: stimuli)"),
     "pointsets --levels 8 27 60": ("levels", "cubes", "60"),
     "pointsets --levels 8 27": ("levels", "at least three"),
     "pointsets --cases 0": ("cases", "0"),
@@ -147,7 +148,7 @@ def test_bad_input_is_refused(
 ) -> None:
     monkeypatch.chdir(tmp_path)
     name, *arguments = shlex.split(line)
-    arguments += ["--out", "out"] if line != "perception sing" else []
+    arguments += ["--out", "out"] if line not in ("perception sing", "perception stimulii") else []
     arguments += ["--references", "cache"] if name in CACHED else []
     assert_refused(call_script(f"{name}.py", monkeypatch, *arguments), capsys, REFUSED[line])
     assert nothing_in(tmp_path / "out") and nothing_in(tmp_path / "cache")

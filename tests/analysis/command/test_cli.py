@@ -61,11 +61,12 @@ def test_options_are_parsed() -> None:
 @pytest.mark.parametrize(
     ("arguments", "parts"),
     [
-        (["--nope", "3"], ["--nope"]),
-        (["--coumt", "3"], ["--coumt", "--count"]),
+        (["--nope", "3"], ["expected an option of this command, got --nope"]),
+        (["--coumt", "3"], ["expected an option of this command, got --coumt (nearest: --count)"]),
+        (["--coumt", "3", "--shars", "1"], ["expected an option of this command, got --coumt (nearest: --count)"]),
         (["--count", "x"], ["--count", "'x'"]),
         (["--count"], ["--count"]),
-        (["stray"], ["stray"]),
+        (["stray"], ["expected no further argument, got 'stray'"]),
         (["--count", "-1"], ["count: expected at least 0", "got -1"]),
         (["--tsar.batch-size", "-3"], ["batch_size: expected between 1 and 8192 framelets, got -3"]),
         (["--tsar.tiling.level-max", "9"], ["tiling.level_max: expected between 2 and 7, got 9"]),
