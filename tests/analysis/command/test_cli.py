@@ -62,7 +62,6 @@ def test_options_are_parsed() -> None:
     ("arguments", "parts"),
     [
         (["--nope", "3"], ["expected an option of this command, got --nope"]),
-        (["--coumt", "3"], ["expected an option of this command, got --coumt (nearest: --count)"]),
         (["--coumt", "3", "--shars", "1"], ["expected an option of this command, got --coumt (nearest: --count)"]),
         (["--count", "x"], ["--count", "'x'"]),
         (["--count"], ["--count"]),
