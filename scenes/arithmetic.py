@@ -129,6 +129,19 @@ def inverse(matrix: ArrayLike) -> Array:
     return rows[:, size:]
 
 
+def affine(matrix: Array) -> Array | None:
+    """The transform ``(4, 4)`` with the last row 0 0 0 1 that moves points alike, or None if there is none, as with a
+    perspective. Last rows that are off by rounding, or have another scale, are made exact."""
+    scale, slant = float(matrix[3, 3]), float(np.abs(matrix[3, :3]).max())
+    if matrix[3].tolist() == [0.0, 0.0, 0.0, 1.0]:
+        return matrix
+    if not abs(scale) > 1e-30 or not slant <= 1e-9 * abs(scale):
+        return None
+    found = matrix / scale
+    found[3] = 0.0, 0.0, 0.0, 1.0
+    return found
+
+
 def rotation_about(axis: ArrayLike, angle: ArrayLike) -> Rotation:
     """Rotations about a unit axis ``(3,)``, counter-clockwise seen from its tip, by one angle or ``(n,)`` angles,
     radians."""

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from scenes.arithmetic import product
+from scenes.arithmetic import affine, product
 from scenes.canonical import Instance, Light, Matrix, Mesh, RigidTrack, SceneError
 from scenes.canonical.values import vertices_of
 from scenes.formats.losses import LossReport
@@ -130,6 +130,8 @@ class _Reader:
         matrix = now if moving and track is None else product(above[0], frame)
         if not all(np.isfinite(one).all() for one in (above, matrix, now)):
             raise misplaced(f"nodes[{number}]", "a finite transform to the world", "one that overflows")
+        if affine(local) is None:
+            raise misplaced(f"nodes[{number}].matrix", "a last row of 0 0 0 1", "a perspective")
         self._world[number] = now
         if moving:
             self._moving.add(number)

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from scenes.animation import continuous_quaternions
-from scenes.arithmetic import rotation_between
+from scenes.arithmetic import affine, rotation_between
 from scenes.formats.losses import LossReport
 from scenes.models.gltf_data import GltfData
 from scenes.models.json_records import misplaced, require
@@ -26,7 +26,9 @@ def local_poses(values: dict[str, Any], count: int = 1) -> Poses:
     found = np.zeros((count, 4, 4))
     found[:] = np.eye(4)
     if "matrix" in values:
-        found[:] = np.asarray(values["matrix"], np.float64).reshape(4, 4).T
+        given = np.asarray(values["matrix"], np.float64).reshape(4, 4).T
+        plain = affine(given)
+        found[:] = given if plain is None else plain  # a perspective is refused where the node is known
         return found
     move, turn, scale = (np.asarray(values.get(name, rest), np.float64) for name, rest in _REST.items())
     if turn.any():

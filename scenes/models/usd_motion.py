@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from scenes.arithmetic import inverse, product
+from scenes.arithmetic import affine, inverse, product
 from scenes.canonical import Matrix, RigidTrack, SceneError
 from scenes.models.motion import Pose, rigid_track, uniform_times
 from scenes.models.usd_library import Usd, UsdGeom
@@ -91,4 +91,7 @@ def _finite(matrix: Any, prim: Any) -> Matrix:
     found = np.array(matrix, np.float64).T
     if not np.isfinite(found).all():
         raise SceneError(f"cannot be read: {prim.GetName()}: expected a finite transform")
-    return found
+    plain = affine(found)
+    if plain is None:
+        raise SceneError(f"cannot be read: {prim.GetName()}: expected a transform without perspective")
+    return plain

@@ -11,6 +11,7 @@ from pathlib import Path
 
 import numpy as np
 
+from scenes.arithmetic import affine
 from scenes.canonical import Material, Medium, SceneError
 from scenes.canonical.values import Matrix
 from scenes.formats.directives.names import Names
@@ -239,11 +240,12 @@ def checked(directive: Directive, found: Matrix) -> Matrix:
     Raises:
         SceneError: it is not invertible.
     """
-    if found[3].tolist() != [0.0, 0.0, 0.0, 1.0] or not invertible(found):
+    plain = affine(found)
+    if plain is None or not invertible(plain):
         raise SceneError(
             f"{directive.place}: {directive.name}: expected a matrix that can be inverted, last row 0 0 0 1"
         )
-    return found
+    return plain
 
 
 def typed(directive: Directive) -> tuple[str, Parameters]:

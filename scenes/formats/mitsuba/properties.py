@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from scenes.arithmetic import power, product
+from scenes.arithmetic import affine, power, product
 from scenes.canonical import Rgb, SceneError
 from scenes.canonical.values import Matrix
 from scenes.formats.appearance.spectra import grey, radiant_rgb, rgb, sampled_rgb, xyz_to_rgb
@@ -201,9 +201,10 @@ def transform_of(node: XmlNode) -> Matrix:
         else:
             raise SceneError(f"{step.place}: expected a step of a transform, got {step.tag!r}")
         matrix = product(made, matrix)
-    if not invertible(matrix):
-        raise SceneError(f"{node.place}: transform: expected one that can be inverted")
-    return matrix
+    plain = affine(matrix)
+    if plain is None or not invertible(plain):
+        raise SceneError(f"{node.place}: transform: expected one that can be inverted, without perspective")
+    return plain
 
 
 def _looked_along(step: XmlNode) -> Matrix:
