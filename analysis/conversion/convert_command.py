@@ -17,5 +17,5 @@ def main() -> None:
     from analysis.conversion.run import convert
 
     found = convert(options)
-    counts = f"{found['instances']} shapes, {found['lights']} lights, {len(found['losses'])} losses"
+    counts = f"{found['instances']} shapes, {found['lights']} lights, {found['count']} losses"
     show(*found["lines"], f"{counts}; {options.target}")

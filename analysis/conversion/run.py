@@ -37,7 +37,7 @@ def convert(options: ConvertOptions) -> dict[str, Any]:
         seconds = {"read": read - begun, "written": time.perf_counter() - read}
         found = {"losses": report.rows(), "instances": len(scene.instances), "lights": len(scene.lights)}
         write_json(options.report_file, with_source({**found, "seconds": seconds}, options, seed=0))
-    return {**found, "lines": report.lines()}
+    return {**found, "lines": report.lines(), "count": len(report.losses)}
 
 
 def check(options: CheckOptions) -> list[Table]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from dataclasses import asdict, dataclass
+from typing import Any
 
 from scenes.canonical import Scene, SceneError
 
@@ -20,6 +21,9 @@ HINTS = frozenset(
     "usevariance largemutationprob maxconsecrejects scramble diagonal".split()
 )
 """Parameters that affect how a renderer computes its picture, but not the picture."""
+
+
+_LISTED = 10  # places of equal losses in the report of a conversion
 
 
 @dataclass(frozen=True)
@@ -85,9 +89,21 @@ class LossReport:
         """All losses, in the order in which they were added."""
         return tuple(self._losses)
 
-    def rows(self) -> list[dict[str, str]]:
-        """The losses as JSON objects."""
-        return [asdict(loss) for loss in self._losses]
+    def rows(self) -> list[dict[str, Any]]:
+        """The losses as JSON objects: of equal losses the first ten places, the last of them with the number of all
+        others, ``more``."""
+        made: list[dict[str, Any]] = []
+        counts: dict[tuple[str, str, bool], int] = {}
+        lasts: dict[tuple[str, str, bool], dict[str, Any]] = {}
+        for loss in self._losses:
+            kind = loss.what, loss.became, loss.picture
+            counts[kind] = counts.get(kind, 0) + 1
+            if counts[kind] <= _LISTED:
+                lasts[kind] = asdict(loss)
+                made.append(lasts[kind])
+            else:
+                lasts[kind]["more"] = counts[kind] - _LISTED
+        return made
 
     def lines(self) -> list[str]:
         """Lines of the losses that change the picture, then of the hints; equal losses at several places share a
