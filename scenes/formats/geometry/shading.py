@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from scenes.arithmetic import arccos, determinant
+from scenes.arithmetic import arccos, determinant, product
 from scenes.canonical import Mesh
 from scenes.formats.geometry.orientation import area_normals, facing_normals, scales_evenly
 
@@ -39,7 +39,7 @@ def placed_normals(mesh: Mesh, place: np.ndarray, faceted: bool) -> Mesh:
         faces = mesh.faces[:, ::-1].copy() if determinant(place) < 0.0 else mesh.faces
         return Mesh(mesh.vertices, faces, None, mesh.uvs, mesh.source)
     linear = place[:3, :3]
-    normals = _smooth(mesh.vertices.astype(np.float64) @ linear.T, mesh.faces) @ linear
+    normals = product(_smooth(product(mesh.vertices.astype(np.float64), linear.T), mesh.faces), linear)
     length = np.linalg.norm(normals, axis=1, keepdims=True)
     normals = np.where(length > 0.0, normals / np.where(length > 0.0, length, 1.0), (0.0, 0.0, 1.0))
     return facing_normals(Mesh(mesh.vertices, mesh.faces, normals.astype(np.float32), mesh.uvs, mesh.source))
