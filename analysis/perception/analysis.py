@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
@@ -168,6 +168,7 @@ def recovery(
     experiments: int,
     bootstraps: int,
     seed: int,
+    advance: Callable[[], object] = lambda: None,
 ) -> dict[str, Any]:
     """How well fits recover a known threshold of observers that differ.
 
@@ -179,6 +180,7 @@ def recovery(
         experiments: number of simulated studies.
         bootstraps: bootstrap data sets of each interval.
         seed: seed of all random numbers.
+        advance: called after each study.
 
     Returns:
         The share of intervals that contain the threshold, with Wilson's 95 % interval of that share; the median of the
@@ -197,6 +199,7 @@ def recovery(
         held += low <= jnd <= high
         ratios.append(found.jnd / jnd)
         widths.append(high / max(low, 1e-9))
+        advance()
     between = binomtest(held, experiments).proportion_ci(method="wilson")
     return {
         "jnd": jnd, "sigma": sigma, "lapse": lapse, "spread": spread, "coverage": held / experiments,

@@ -17,6 +17,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache
+from typing import Any
 
 import numpy as np
 from jaxtyping import Float, Int
@@ -94,8 +95,12 @@ def correct_share(
 
 def threshold_samples(mu: float, sigma: float, lapse: float, rule: Rule = TWO_ALTERNATIVES) -> float:
     """Samples per pixel at which a function crosses the threshold."""
-    reached = (rule.threshold - rule.guess) / (1.0 - rule.guess - lapse)
-    return float(2.0 ** (mu - sigma * stats.norm.ppf(reached)))
+    return float(2.0 ** _threshold_octaves(mu, sigma, lapse, rule))
+
+
+def _threshold_octaves(mu: Any, sigma: Any, lapse: Any, rule: Rule) -> Any:
+    """Base-two logarithm of that number of samples."""
+    return mu - sigma * stats.norm.ppf((rule.threshold - rule.guess) / (1.0 - rule.guess - lapse))
 
 
 def fit(
@@ -142,7 +147,7 @@ def fit(
             drawn = rng.binomial(n, share, (bootstraps, len(x)))
             counts = np.broadcast_to(n, drawn.shape)
         found = _best(grid, drawn, counts)
-        jnds = np.array([_placed(threshold_samples(*row, rule=rule), x)[0] for row in found])
+        jnds = np.array([_placed(2.0**octaves, x)[0] for octaves in _threshold_octaves(*found.T, rule=rule).tolist()])
         tail = tail_share(people)
         low, high = np.quantile(jnds, [tail, 1.0 - tail], method="nearest")
         interval = min(float(low), jnd), max(float(high), jnd)

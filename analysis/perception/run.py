@@ -14,7 +14,7 @@ from analysis.command.cli import InputError, bad_input, full_disk
 from analysis.command.interrupts import settled
 from analysis.command.progress import Bars, bars
 from analysis.perception import analysis as analyses
-from analysis.perception import plots
+from analysis.perception import nulls, plots
 from analysis.perception.observers import TASK, drawn_observers, simulated_trials
 from analysis.perception.options import (
     AdaptiveOptions,
@@ -167,11 +167,11 @@ def adaptive(options: AdaptiveOptions, bars: Bars) -> Found:
 def recover(options: RecoverOptions, bars: Bars) -> Found:
     """Fits answers drawn from known functions."""
     cases = list(product(options.jnds, options.sigmas, options.lapses, options.spreads))
-    task, rows = bars.task("functions", len(cases)), []
+    task, rows = bars.task("studies", options.experiments * (len(cases) + len(options.spreads))), []
     for case in cases:
         people, sizes = (options.observers, options.answers), (options.experiments, options.bootstraps)
-        rows.append(analyses.recovery(LEVELS, *case, people, *sizes, options.seed))
-        task.advance()
+        rows.append(analyses.recovery(LEVELS, *case, people, *sizes, options.seed, task.advance))
+    tests = [nulls.false_positives(options, spread, task.advance) for spread in options.spreads]
     table = pd.DataFrame(rows)
     write_table(options.out / "recovery.csv", table)
     lines = [
@@ -181,7 +181,7 @@ def recover(options: RecoverOptions, bars: Bars) -> Found:
         f"median of the fits over it {row['jnd_ratio_median']:.3f}"
         for row in rows
     ]
-    return {"rows": rows}, "\n".join(lines)
+    return {"rows": rows, "tests": tests}, "\n".join([*lines, *map(nulls.described, tests)])
 
 
 def figures(options: FiguresOptions, bars: Bars) -> Found:

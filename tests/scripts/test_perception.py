@@ -130,7 +130,10 @@ def test_known_thresholds_are_given_back(tmp_path: Path, monkeypatch, capsys) ->
     assert call_script("perception.py", monkeypatch, "recover", *short, "--out", str(tmp_path)) == 0
     (row,) = summary(tmp_path)["rows"]
     assert row["coverage_low"] < 0.95 and row["jnd_ratio_median"] == pytest.approx(1.0, abs=0.15)
-    assert "the 95 % interval holds it in" in capsys.readouterr().out
+    (null,) = summary(tmp_path)["tests"]
+    assert 60 < null["tests"] <= 8 * 12 and 0.0 <= null["by_observer"] < 0.15
+    said = capsys.readouterr().out
+    assert "the 95 % interval holds it in" in said and "% are below 5 % with one entry an observer" in said
 
 
 def test_a_changed_stimulus_is_noticed(tmp_path: Path, monkeypatch, capsys) -> None:

@@ -7,6 +7,7 @@ import pandas as pd
 import pytest
 
 from analysis.perception.analysis import comparisons, fits, power, strongest
+from analysis.perception.nulls import described, false_positives
 from analysis.perception.observers import (
     COLUMNS,
     JOD_SIGMA,
@@ -16,6 +17,7 @@ from analysis.perception.observers import (
     dual_pair_share,
     simulated_trials,
 )
+from analysis.perception.options import RecoverOptions
 from analysis.perception.psychometrics import paired
 
 
@@ -115,6 +117,17 @@ def test_equal_conditions_are_found_to_differ_as_often_as_the_tests_say() -> Non
     shares = [float((np.array(values) < 0.05).mean()) for values in (by_observer, by_cell)]
     assert len(by_observer) == len(by_cell) == 16 * 8
     assert 0.01 < shares[0] < 0.09 and shares[1] > 1.7 * shares[0], shares
+
+
+def test_false_positives_are_counted_over_observers_and_over_cells() -> None:
+    """Where observers differ much, entries of one observer are alike, and tests that count them find too much."""
+    options = RecoverOptions(experiments=16, answers=36)
+    counted = []
+    row = false_positives(options, 2.0, lambda: counted.append(1))
+    assert len(counted) == 16 and 100 < row["tests"] <= 16 * 8
+    assert (
+        row["by_observer"] < 0.08 and row["by_cell"] > 2.0 * row["by_observer"] and "2 octaves apart" in described(row)
+    )
 
 
 def test_power_is_less_where_observers_differ() -> None:
