@@ -41,7 +41,7 @@ def _stl(content: bytes, name: str) -> Mesh | None:
     """Triangles of an STL file; its normals are those of the triangles and are not read."""
     import trimesh  # a slow import, and most scenes read no model
 
-    loaded = trimesh.load_mesh(io.BytesIO(content), file_type="stl", process=False)
+    loaded = trimesh.load_mesh(io.BytesIO(_whole(content)), file_type="stl", process=False)
     vertices, faces = np.array(loaded.vertices, np.float64), np.array(loaded.faces, np.int64)
     if not len(faces):
         return None
@@ -49,3 +49,20 @@ def _stl(content: bytes, name: str) -> Mesh | None:
         raise SceneError("vertices hold non-finite values")
     points, index = np.unique(vertices, axis=0, return_inverse=True)
     return Mesh(vertices_of(points), index.reshape(-1)[faces].astype(np.int32), source=name)
+
+
+def _whole(content: bytes) -> bytes:
+    """A file without what follows the triangles that the header of a binary one announces.
+
+    Raises:
+        SceneError: a binary file has fewer triangles.
+    """
+    start, each = 84, 50
+    if len(content) < start or content.lstrip()[:5].lower() == b"solid":  # text, or binary with such a header
+        return content
+    count = int.from_bytes(content[start - 4 : start], "little")
+    if len(content) < start + each * count:
+        raise SceneError(
+            f"cannot be read: expected {count} triangles as its header says, got {(len(content) - start) // each}"
+        )
+    return content[: start + each * count]

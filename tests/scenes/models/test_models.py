@@ -105,6 +105,17 @@ def test_vertex_colours_and_files_without_any(tmp_path: Path) -> None:
     assert read_model(tmp_path / "red.ply")[0].material.diffuse.value == pytest.approx((1.0, 0.0, 0.0))
 
 
+def test_binary_stl_with_bytes_behind_its_triangles_and_with_too_few(tmp_path: Path) -> None:
+    """Some programs append data; a file that was cut off says so."""
+    content = trimesh.creation.box().export(file_type="stl")
+    path = tmp_path / "in.stl"
+    path.write_bytes(content + b"appended")
+    assert len(read_model(path)[0].shape.faces) == 12
+    path.write_bytes(content[:-60])
+    with pytest.raises(SceneError, match="expected 12 triangles as its header says, got 10"):
+        read_model(path)
+
+
 def test_a_model_is_placed_with_all_its_parts(tmp_path: Path) -> None:
     path = written(tmp_path, "newmtl paint\nKd 0.7 0.2 0.1\n")
     track = RigidTrack(0.0, 1.0, np.zeros((1, 3)), np.array([[0.0, 0.0, 0.0, 1.0]]))
