@@ -62,7 +62,7 @@ _SWITCHES = {
     "noise": "noise of random samples told from detail",
 }
 _NUMBERS: dict[str, tuple[str, tuple[Value, ...]]] = {
-    "cycle_exponent": ("most samples of a cycle, as a power of the number of pixels", (0.6, 0.65, 0.75, 0.8, 0.85)),
+    "cycle_exponent": ("most samples of a cycle, as a power of the number of pixels", (0.6, 0.65, 0.75, 0.8)),
     "footprint": ("samples along a pixel's side that textures are filtered for", (1, 2, 8)),
     "latency_cycles": ("cycles from sampling to display", (2, 3)),
     "memory_s": ("time that observed change is remembered, seconds", (0.05, 0.8)),
