@@ -19,7 +19,7 @@ OWN, THESIS = "tsar", "thesis"
 ROW = 7
 """Row of table 7.2: batch 128 at 512². Knobs that are not turned have the values of this row."""
 BATCHES_HZ = 50.0
-"""Batches a second: about the number that ``tsar`` samples at row 7 on the machine that shows 8 framed images a second."""
+"""Batches a second: about as many as ``tsar`` samples at row 7 on the machine that shows 8 framed images a second."""
 
 Value = bool | int | float | str
 
