@@ -28,7 +28,6 @@ _SWITCHED_OFF = {
     "noise": "noise is blended as detail is",
 }
 _CYCLES, _FINE, _PIXEL = 3, 2, 1
-_LONG = 0.8
 
 
 @dataclass(frozen=True)
@@ -54,8 +53,8 @@ def all_parts() -> tuple[Part, ...]:
     found += [
         Part("jitter-1x", "no jitter, textures filtered for the output's pixels", unfiltered),
         Part("latency", f"latency of {_CYCLES} cycles", (("latency_cycles", _CYCLES),)),
-        Part("cycles", "longer cycles", (("cycle_exponent", _LONG),)),
-        Part("whole-batch", "a cycle takes the whole batch", (("cycle_exponent", 1.0),)),
+        Part("cycles", f"cycles {_CYCLES} times as long", (("share_max", _CYCLES * DEFAULT.share_max),)),
+        Part("whole-batch", "a cycle takes the whole batch", (("share_max", 1.0),)),
         *(Part(f"footprint-{n}x", f"texture footprint {n}x", (("footprint", n),)) for n in (_PIXEL, _FINE)),
     ]
     return tuple(part for part in found if any(getattr(DEFAULT, name) != value for name, value in part.options))

@@ -19,7 +19,7 @@ OWN, THESIS = "tsar", "thesis"
 ROW = 7
 """Row of table 7.2: batch 128 at 512². Knobs that are not turned have the values of this row."""
 BATCHES_HZ = 50.0
-"""Batches a second: about as many as ``tsar`` samples at row 7 on the machine that shows 8 framed images a second."""
+"""Batches a second: the number that ``tsar`` samples at row 7 on the machine that shows 8 framed images a second."""
 
 Value = bool | int | float | str
 
@@ -62,7 +62,7 @@ _SWITCHES = {
     "noise": "noise of random samples told from detail",
 }
 _NUMBERS: dict[str, tuple[str, tuple[Value, ...]]] = {
-    "cycle_exponent": ("most samples of a cycle, as a power of the number of pixels", (0.6, 0.65, 0.75, 0.8)),
+    "share_max": ("longest cycle, as a share of the pixels that it samples", (1 / 128, 1 / 64, 1 / 16, 1 / 8)),
     "footprint": ("samples along a pixel's side that textures are filtered for", (1, 2, 8)),
     "latency_cycles": ("cycles from sampling to display", (2, 3)),
     "memory_s": ("time that observed change is remembered, seconds", (0.05, 0.8)),

@@ -52,7 +52,7 @@ FilterStageName = Literal["chosen", "taken_in"]
 _OPTIONS: Mapping[str, tuple[bool, ...] | None] = dict.fromkeys(
     (
         *("reprojection", "prediction", "smoothing", "accumulation", "jitter", "by_gain", "spread", "shadows"),
-        *("probes", "noise", "latency_cycles", "wavelets", "cycle_exponent", "footprint"),
+        *("probes", "noise", "latency_cycles", "wavelets", "share_max", "footprint"),
         *("life_min_s", "life_max_s", "reach", "memory_s"),
     )
 )

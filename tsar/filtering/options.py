@@ -22,8 +22,8 @@ class FilterOptions:
         latency_cycles: cycles from the start of a cycle to the display of its picture, at least 1.
         noise: whether noise is told from detail, in scenes whose samples draw random numbers.
         wavelets: whether roughness and change are measured by the wavelets of the dissertation.
-        cycle_exponent: maximum number of samples of a cycle, as the power of the number of the output's pixels that it
-            is; a larger batch is divided into several cycles. 1 is every pixel.
+        share_max: maximum number of samples of a cycle, as a share of the output's pixels; a larger batch is divided
+            into several cycles.
         footprint: number of samples along a pixel's side for which textures are filtered.
         life_min_s, life_max_s: bounds of the time for which a sample is assumed to be useful, seconds.
         reach: distance after which a moving surface is assumed to be out of sight, as a share of the image's side.
@@ -42,7 +42,7 @@ class FilterOptions:
     noise: bool = True
     latency_cycles: int = 1
     wavelets: bool = False
-    cycle_exponent: float = 0.7
+    share_max: float = 1.0 / 32.0
     footprint: int = 4
     life_min_s: float = 0.2
     life_max_s: float = 4.0

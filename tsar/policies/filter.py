@@ -6,8 +6,8 @@ tiles whose samples remove the most error for the longest time and averages the 
 residuals it learns how fast the picture changes, and from the shadows of moving objects where it will change soon. It
 shows the estimates, blended with their surroundings where they are uncertain. ``filter`` omits the reprojection.
 
-The framelets of a cycle are tiles of 8 x 8 samples. A batch of more samples than a power of the number of the output's
-pixels is divided into several cycles, which keeps the latency low.
+The framelets of a cycle are tiles of 8 x 8 samples. A batch of more than a 32nd of the output's pixels is divided into
+several cycles, which keeps the latency low.
 """
 
 from __future__ import annotations
@@ -98,7 +98,7 @@ class Filter(Policy[State]):
         self._stages, self._own_threads = stages.filtering, stages.own_threads
         self._view = setting.view if options.reprojection else None
         self._noisy = options.noise and options.smoothing and setting.random()
-        most = int(self.config.pixels**options.cycle_exponent) // TILE_SIDE**2
+        most = int(options.share_max * self.config.pixels) // TILE_SIDE**2
         asked = self.config.batch_size * self.config.samples // TILE_SIDE**2
         self._tiles = max(1, min(asked, most))
         cell = morton_to_raster(TILE_SIDE)
@@ -289,7 +289,7 @@ def _maps(state: State) -> Mapping[str, MapShown]:
 
 
 WITHOUT_REPROJECTION = FilterOptions(
-    reprojection=False, probes=False, cycle_exponent=1.0, life_min_s=0.1, life_max_s=1.0, memory_s=0.1
+    reprojection=False, probes=False, share_max=1.0, life_min_s=0.1, life_max_s=1.0, memory_s=0.1
 )
 """The filter alone. Its samples are useful for a shorter time, because they do not follow moving surfaces."""
 unmoved = partial(Filter, options=WITHOUT_REPROJECTION)

@@ -140,7 +140,7 @@ def test_shadows_move_as_in_the_reference(side: int, kind: str) -> None:
 
 OPTIONS = {
     "tsar": DEFAULT,
-    "filter": FilterOptions(reprojection=False, probes=False, cycle_exponent=1.0),
+    "filter": FilterOptions(reprojection=False, probes=False, share_max=1.0),
     "replaces": FilterOptions(accumulation=False, spread=False),
 }
 

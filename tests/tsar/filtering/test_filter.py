@@ -13,7 +13,7 @@ from renderer.stages.control import stages
 from tests.oracles.screens import Layer, Screen
 from tsar.clock import StageTimer, fixed_clock
 from tsar.config import TilingConfig, TsarConfig
-from tsar.filtering.options import DEFAULT, FilterOptions
+from tsar.filtering.options import FilterOptions
 from tsar.policies import POLICIES
 from tsar.policies.filter import Filter
 from tsar.policy import Moment, Policy, Setting, run, step
@@ -53,7 +53,7 @@ def panned(pixels_per_s: float) -> Screen:
 def test_a_still_picture_converges(name: str) -> None:
     """With 16 samples a pixel the error is below a half of that of one, with 32 below a third, and it stays there."""
     screen = panned(0.0)
-    options = FilterOptions(reprojection=name == "tsar", cycle_exponent=0.8)  # longer cycles, for the test's speed
+    options = FilterOptions(reprojection=name == "tsar", share_max=1.0 / 8.0)  # longer cycles, for the test's speed
     policy = Filter(Setting(replace(CONFIG, resolution_px=128), stages, view=screen.view), options)
     state, cycles = policy.start(), 32 * 128**2 // policy.price.samples
     cycle_s, truth = 4.0 / cycles, screen.picture(0.0, 128)
@@ -132,7 +132,7 @@ def test_every_part_can_be_left_out(part: str) -> None:
 def test_every_sample_that_is_charged_is_asked_for() -> None:
     policy = POLICIES["tsar"](Setting(CONFIG, view=panned(0.0).view))
     _, batch = policy.request(policy.start(), Moment(0.0, 0, CYCLE_S))
-    assert batch.position[..., 0].numel() == policy.price.samples <= (64**2) ** DEFAULT.cycle_exponent
+    assert batch.position[..., 0].numel() == policy.price.samples <= 64**2 / 32
     assert batch.times.min() == 0.0 and batch.times.max() < CYCLE_S
 
 
