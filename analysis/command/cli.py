@@ -113,7 +113,7 @@ def parse(options: type[Options], description: str, arguments: list[str] | None 
     import tyro
 
     from analysis.command.messages import as_typed, one_line
-    from analysis.command.subjects import by_subject, renamed
+    from analysis.command.subjects import by_subject, renamed, unknown
 
     caught, given = io.StringIO(), sys.argv[1:] if arguments is None else arguments
     shown = by_subject(options) if {"-h", "--help"}.intersection(given) else options
@@ -125,7 +125,8 @@ def parse(options: type[Options], description: str, arguments: list[str] | None 
     except SystemExit as stop:
         if not stop.code:
             raise
-        raise InputError(renamed(options, given) or as_typed(one_line(caught.getvalue(), given), given)) from None
+        line = renamed(options, given) or unknown(options, given)
+        raise InputError(line or as_typed(one_line(caught.getvalue(), given), given)) from None
 
 
 def _as_called(description: str) -> str:

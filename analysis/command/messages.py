@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import ast
-import difflib
 import itertools
 import re
 from collections.abc import Sequence
@@ -28,8 +27,7 @@ _CHOICE = re.compile(
     r"invalid choice '(?P<got>.*)' for argument '(?P<name>--\S+)'\. Expected one of (?P<all>\(.*\))\.$"
 )
 _MISSING = re.compile(r"Missing value for argument '(?P<name>--\S+)'\. Expected (?P<count>\d+) values")
-_ADVICE = "Perhaps you meant|Arguments similar to|Available subcommands"
-_UNKNOWN = re.compile(rf"Unrecognized options: (?P<all>.*?)(?: (?:{_ADVICE})(?P<rest>: .*| .*))?$")
+_UNKNOWN = re.compile(r"Unrecognized (?:or misplaced )?options: (?P<first>.*?)(?:, | \(applied to |$)")
 _RECORD = re.compile(r"^(?:\w+\.)+(?P<name>\w+)(?=: )")
 
 
@@ -98,21 +96,16 @@ def _missing(text: str, given: Sequence[str]) -> str:
 
 
 def _unknown(text: str) -> str:
-    """A line about the first option, step or other word that the command does not know; empty if the text is about
-    something else."""
+    """A line about the first word that the command does not know; empty if the text is about something else."""
     found = _UNKNOWN.search(text)
     if found is None:
         return ""
-    words, rest = found["all"].split(", "), found["rest"] or ""
-    if "Available subcommands" in text:
-        return not_among(words[0], rest.removeprefix(": ").split(", "))
-    options = [word for word in words if word[:1] == "-"]
-    if not options:
-        return f"expected no further argument, got {words[0]!r}"
-    own = rest.partition(f"{options[0]}: ")[2].partition("Arguments similar to")[0] or rest
-    near = difflib.get_close_matches(options[0], re.findall(r"(?<![\w-])--[a-z][\w.-]*", own), n=1)
-    hint = f" (nearest: {near[0]})" if near else ""
-    return f"expected an option of this command, got {options[0]}{hint}"
+    word = found["first"]
+    return (
+        f"expected an option of this command, got {word}"
+        if word[:1] == "-"
+        else f"expected no further argument, got {word!r}"
+    )
 
 
 def _values_of(name: str, given: Sequence[str]) -> str:

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import ast
 import dataclasses
+import difflib
 import inspect
 import itertools
+import re
 import textwrap
 import types
 from collections.abc import Iterator, Sequence
@@ -14,6 +16,7 @@ from typing import Annotated, Any, Union, get_args, get_origin, get_type_hints
 import tyro
 
 from analysis.command.options import RENAMED
+from tsar.named import not_among
 
 MOST = 10
 """Greatest number of options in a box."""
@@ -82,6 +85,12 @@ class _Option:
         alone = self.record or {tyro.conf.Positional, tyro.conf.Suppress}.intersection(self.marks)
         return None if alone else _SUBJECT_OF.get(self.field.name, _REST)
 
+    def spellings(self, name: str) -> tuple[str, ...]:
+        """How it is typed where it is called ``name``: one that is on or off has a second form, which says no."""
+        kind = get_args(self.kind)[0] if self.marks else self.kind
+        before, dot, last = name.rpartition(".")
+        return (f"--{name}", f"--{before}{dot}no-{last}") if kind is bool else (f"--{name}",)
+
     @property
     def member(self) -> tuple[str, Any, Any]:
         """The same as a field of a new record."""
@@ -119,15 +128,10 @@ def by_subject(options: Any) -> Any:
 
 def described(options: Any) -> dict[str, str]:
     """The text of every option of a record, by the name that is typed."""
-    found = {}
-    for one in _options(options, merged=False):
-        name = one.field.name.replace("_", "-")
-        if one.record:
-            prefix = "" if tyro.conf.OmitArgPrefixes in one.marks else f"{name}."
-            found |= {f"--{prefix}{inner[2:]}": text for inner, text in described(one.record).items()}
-        elif one.subject is not None:
-            found[f"--{name}"] = one.doc or next(mark.help for mark in one.marks if getattr(mark, "help", None))
-    return found
+    return {
+        f"--{name}": one.doc or next(mark.help for mark in one.marks if getattr(mark, "help", None))
+        for name, one in _named(options)
+    }
 
 
 def renamed(options: Any, given: Sequence[str]) -> str:
@@ -137,14 +141,53 @@ def renamed(options: Any, given: Sequence[str]) -> str:
         options: a record of options, or a union of such records.
         given: arguments of the command line.
     """
-    records = [get_args(part)[0] for part in get_args(options)] or [options]
-    names = {name for record in records for name in described(record)}
+    names = {name for record in _records(options).values() for name in described(record)}
     for argument in given:
         old = argument.partition("=")[0]
         for new in RENAMED.get(old, ()):
             if new in names and old not in names:
                 return f"{old}: expected {new}, the name of this option now"
     return ""
+
+
+def unknown(options: Any, given: Sequence[str]) -> str:
+    """One line about the step of the command line, or the first option, that is not known; empty if all are.
+
+    Args:
+        options: a record of options, or a union of such records.
+        given: arguments of the command line.
+    """
+    records = _records(options)
+    step = given[0] if given and len(records) > 1 else ""
+    if step not in records:
+        return not_among(step, records) if step else ""
+    names = [one for name, option in _named(records[step]) for one in option.spellings(name)]
+    for argument in given:
+        typed = argument.partition("=")[0]
+        if re.match(r"--[a-z]", typed) and typed.replace("_", "-") not in names:
+            near = difflib.get_close_matches(typed[2:], [name[2:] for name in names], n=1)
+            hint = f" (nearest: --{near[0]})" if near else ""
+            return f"expected an option of this command, got {typed}{hint}"
+    return ""
+
+
+def _records(options: Any) -> dict[str, Any]:
+    """The records of a union by the names of their steps; a record that is no step under an empty name."""
+    if get_origin(options) not in (Union, types.UnionType):
+        return {"": options}
+    parts = [get_args(part) for part in get_args(options)]
+    return {next(mark.name for mark in marks if getattr(mark, "name", None)): record for record, *marks in parts}
+
+
+def _named(record: Any, prefix: str = "") -> Iterator[tuple[str, _Option]]:
+    """Options of a record and of those inside it that are typed by name, each with this name, without hyphens before
+    it."""
+    for one in _options(record, merged=False):
+        name = f"{prefix}{one.field.name.replace('_', '-')}"
+        if one.record:
+            yield from _named(one.record, prefix if tyro.conf.OmitArgPrefixes in one.marks else f"{name}.")
+        elif one.subject is not None:
+            yield name, one
 
 
 def _options(record: Any, merged: bool) -> Iterator[_Option]:

@@ -63,6 +63,8 @@ def test_options_are_parsed() -> None:
     [
         (["--nope", "3"], ["expected an option of this command, got --nope"]),
         (["--coumt", "3", "--shars", "1"], ["expected an option of this command, got --coumt (nearest: --count)"]),
+        (["--coumt=3"], ["expected an option of this command, got --coumt (nearest: --count)"]),
+        (["-x"], ["expected an option of this command, got -x"]),
         (["--count", "x"], ["--count", "'x'"]),
         (["--count"], ["--count"]),
         (["stray"], ["expected no further argument, got 'stray'"]),
