@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from typing import Any
 
@@ -33,7 +34,7 @@ def false_positives(
     Returns:
         ``by_observer``, the share of tests with one entry per observer, as of
         :func:`analysis.perception.analysis.comparisons`; ``by_cell``, that of tests with one entry per observer and
-        point set, as in the thesis; and their number.
+        point set, as in the thesis; and the number of the former. A share of no tests is NaN.
     """
     jnd, sigma, lapse = options.jnds[0], options.sigmas[0], options.lapses[0]
     mu, people, answers = population_mu(jnd, sigma, lapse, spread), options.observers, max(options.answers // 3, 1)
@@ -43,29 +44,30 @@ def false_positives(
     )
     cells = index.to_frame(index=False).assign(time_filter="box")
     person = cells.groupby(["observer", "scene"]).ngroup().to_numpy()
+    levels = cells["samples"].to_numpy(np.float64)
     found: dict[str, list[float]] = {"by_observer": [], "by_cell": []}
     for number in range(options.experiments):
         rng = np.random.default_rng([options.seed, number, 1])
         own = mu + spread * rng.standard_normal(2 * people)
-        levels = cells["samples"].to_numpy(np.float64)
-        share = np.array([correct_share(levels[person == one], at, sigma, lapse) for one, at in enumerate(own)])
-        chance = np.empty(len(cells))
-        chance[np.argsort(person, kind="stable")] = share.reshape(-1)
-        trials = cells.assign(correct=rng.binomial(answers, chance) / answers)
+        share = correct_share(levels, own[person], sigma, lapse)
+        trials = cells.assign(correct=rng.binomial(answers, share) / answers)
         tested = comparisons(trials)
         found["by_observer"] += tested.loc[tested["of"] == "scene", "p"].dropna().tolist()
         for _, level in trials.groupby("samples"):
             both = paired(*level.pivot_table("correct", ["observer", "point_set"], "scene").to_numpy().T.tolist())
             found["by_cell"] += [] if both is None else [both.p]
         advance()
-    shares = {name: float((np.array(values) < _LEVEL).mean()) for name, values in found.items()}
+    shares = {name: float(np.mean(np.array(values) < _LEVEL)) if values else math.nan for name, values in found.items()}
     return {"spread": spread, "tests": len(found["by_observer"]), **shares}
 
 
 def described(row: dict[str, Any]) -> str:
     """One line of text of a result."""
+    equal = f"equal scenes, thresholds {row['spread']:g} octaves apart"
+    if not row["tests"]:
+        return f"{equal}: no test, which needs two observers whose answers differ"
     return (
-        f"equal scenes, thresholds {row['spread']:g} octaves apart: of {row['tests']} tests, "
+        f"{equal}: of {row['tests']} tests, "
         f"{100 * row['by_observer']:.1f} % are below 5 % with one entry an observer, "
         f"{100 * row['by_cell']:.1f} % with one an observer and point set"
     )

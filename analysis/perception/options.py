@@ -141,7 +141,7 @@ class AnalyseOptions:
 @dataclass(frozen=True)
 class RecoverOptions:
     """Draws answers of observers with known psychometric functions, and counts how often the intervals of the fits
-    contain the threshold of the mean function."""
+    contain the threshold of the mean function, and how often tests of equal scenes find a difference."""
 
     jnds: tuple[float, ...] = (40.0, 100.0)
     """True thresholds, samples per pixel; the thesis' are about 40 and 100."""

@@ -87,7 +87,11 @@ class Fit:
 
 
 def correct_share(
-    samples: Float[NDArray[np.float64], "*n"], mu: float, sigma: float, lapse: float, guess: float = GUESS
+    samples: Float[NDArray[np.float64], "*n"],
+    mu: float | Float[NDArray[np.float64], "*n"],
+    sigma: float,
+    lapse: float,
+    guess: float = GUESS,
 ) -> Float[NDArray[np.float64], "*n"]:
     """Probability ``γ + (1 - γ - λ) Φ((μ - log2 n) / σ)`` of a correct answer at ``samples`` per pixel."""
     return guess + (1.0 - guess - lapse) * stats.norm.cdf((mu - np.log2(samples)) / sigma)
