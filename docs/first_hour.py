@@ -1,13 +1,15 @@
-"""Times a newcomer's first hour: clone, install, first picture, page of the demo, with no kernels compiled before.
+"""Times a newcomer's first hour: clone, install, first picture, page of the demo. No kernels are compiled before, and
+pip's cache is empty.
 
-    python docs/first_hour.py FOLDER [REVISION]
+Usage: python docs/first_hour.py FOLDER [REVISION]
 
-FOLDER must not exist. Each command has a line: seconds from the start to its end, how long it took, and processor time
-of it and its children. The last line says the revision, and how busy the machine was.
+Each command has a line: seconds from the start to its end, how long it took, and processor time of it and its children.
+The last line says the revision, and how busy the machine was.
 """
 
 from __future__ import annotations
 
+import argparse
 import datetime
 import os
 import subprocess
@@ -32,13 +34,17 @@ def processor_s() -> float:
 
 
 def main() -> None:
-    if len(sys.argv) not in (2, 3) or Path(sys.argv[1]).exists():
-        sys.exit("expected a folder that does not exist, and a revision or nothing")
-    folder, revision = Path(sys.argv[1]).resolve(), sys.argv[2] if len(sys.argv) == 3 else "HEAD"
-    asked = subprocess.run(["git", "rev-parse", revision], cwd=HERE, check=True, capture_output=True)
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("folder", type=Path, help="folder for the clone, which must not exist")
+    parser.add_argument("revision", nargs="?", default="HEAD", help="what is checked out in it")
+    given = parser.parse_args()
+    folder = given.folder.resolve()
+    if folder.exists():
+        parser.error(f"folder: expected none, got {folder}")
+    asked = subprocess.run(["git", "rev-parse", given.revision], cwd=HERE, check=True, capture_output=True)
     commit = asked.stdout.decode().strip()
     environment = {name: value for name, value in os.environ.items() if name not in ("PYTHONPATH", "VIRTUAL_ENV")}
-    environment["WARP_CACHE_PATH"] = str(folder.with_name(f"{folder.name}-kernels"))
+    environment |= {name: str(folder / ".cache" / name) for name in ("WARP_CACHE_PATH", "PIP_CACHE_DIR")}
     begun, busy = time.monotonic(), psutil.cpu_times()
     print("| command | ends after, s | takes, s | of processor time, s |\n|---|---|---|---|")
 
