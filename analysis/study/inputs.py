@@ -22,8 +22,8 @@ def is_file(input: str) -> bool:
     return input not in INPUTS and bool(Path(input).suffix)
 
 
-def require_input(input: str) -> None:
-    """Checks that an input is the name of a scene, or a file that is there.
+def require_input(input: str, name: str = "input") -> None:
+    """Checks that an input, which the option ``name`` holds, is the name of a scene, or a file that is there.
 
     Raises:
         ConfigError: it is neither.
@@ -31,11 +31,11 @@ def require_input(input: str) -> None:
     if input in INPUTS:
         return
     if is_file(input):
-        require(Path(input).is_file(), "input", "a scene by its name, or a file that is there", input)
+        require(Path(input).is_file(), name, "a scene by its name, or a file that is there", input)
         return
     from scenes import catalog
 
-    catalog.SCENES.require(input, "input")
+    catalog.SCENES.require(input, name)
 
 
 def is_added(input: str) -> bool:

@@ -11,10 +11,8 @@ Examples: python scripts/trade.py --out out/trade
 
 from __future__ import annotations
 
-from analysis.command.cli import bad_input, parse
+from analysis.command.cli import parse
 from analysis.command.extras import require_extra
-from analysis.command.start import first_imports
-from analysis.study.inputs import require_input
 from analysis.trade.options import TradeOptions
 
 
@@ -23,9 +21,6 @@ def main() -> None:
     options = parse(TradeOptions, __doc__ or "")
     options.farm.require_port()  # before slow imports
     require_extra("study", *(["search"] if options.trials else []))
-    with first_imports(), bad_input():
-        for input in options.inputs:
-            require_input(input)
     from analysis.command.console import markdown, show
     from analysis.study.written import end_study
     from analysis.trade.run import trade

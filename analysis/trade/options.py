@@ -12,7 +12,7 @@ from analysis.command.options import REFERENCES, References, Unprefixed
 from analysis.metrics.cost_model import SEGMENTS_DEFAULT, Ledger
 from analysis.metrics.display_model import DisplayModel
 from analysis.study.asked import require_distinct
-from analysis.study.inputs import INPUTS
+from analysis.study.inputs import INPUTS, require_input
 from analysis.trade.knobs import chosen_knobs
 from tsar.config import closed_choices
 
@@ -67,6 +67,8 @@ class TradeOptions:
 
     def __post_init__(self) -> None:
         require_distinct(self, "inputs")
+        for input in self.inputs:
+            require_input(input, "inputs")
         for name in ("knobs", "search_knobs"):
             chosen_knobs(getattr(self, name), name)
         limits.within(

@@ -60,7 +60,7 @@ def test_a_small_measurement(runs: list[str], tmp_path: Path, monkeypatch: pytes
         (("--inputs", "nothing"), ("nothing",)),
         (
             ("--inputs", "nothing.pbrt"),
-            ("input: expected a scene by its name, or a file that is there", "nothing.pbrt"),
+            ("inputs: expected a scene by its name, or a file that is there", "nothing.pbrt"),
         ),
         (("--inputs", "chase", "chase"), ("inputs: expected at least one, none twice",)),
         (("--jod-s", "3"), ("jod_s: expected between 0 and 2",)),
