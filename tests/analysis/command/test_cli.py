@@ -62,10 +62,8 @@ def test_options_are_parsed() -> None:
     ("arguments", "parts"),
     [
         (["--nope", "3"], ["expected an option of this command, got --nope"]),
-        (["--coumt", "3", "--shars", "1"], ["expected an option of this command, got --coumt (nearest: --count)"]),
-        (["--coumt=3"], ["expected an option of this command, got --coumt (nearest: --count)"]),
+        (["--coumt=3", "--shars", "1"], ["expected an option of this command, got --coumt (nearest: --count)"]),
         (["-x"], ["expected an option of this command, got -x"]),
-        (["--count", "x"], ["--count", "'x'"]),
         (["--count"], ["--count"]),
         (["stray"], ["expected no further argument, got 'stray'"]),
         (["--count", "-1"], ["count: expected at least 0", "got -1"]),
