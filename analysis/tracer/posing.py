@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
@@ -23,35 +24,33 @@ class Posing:
 
     Attributes:
         anew: whether the scene is read for each time.
-        later_losses: losses at other times than the first, each once; those that it has, too, are left out.
+        later_losses: losses at other times that were asked for, each once; those of the first are left out.
     """
 
-    def __init__(self, options: RenderOptions, scene: Scene) -> None:
+    def __init__(self, options: RenderOptions, scene: Scene, losses: Iterable[str]) -> None:
         """Builds the renderer of the first time.
 
         Args:
             options: of the command.
             scene: scene as at the first time.
+            losses: those of the first time.
         """
         self._options, self._scene = options, scene
         self._facets = options.integrator == "path"  # so that a model is read once
         self.anew = is_posed(options.scene, self._facets)
         self._time_s, self._renderer = options.time_s, self._of(scene)
         self.later_losses: list[str] = []
-        self._told = {_part_of(loss) for loss in self._seen(self._time_s)[1]} if self.anew else set()
+        self._told = set(map(_part_of, losses))
 
     def at(self, time_s: float) -> Renderer:
         """The renderer of a time in seconds; the last one is kept."""
         if self.anew and time_s != self._time_s:
-            scene, losses = self._seen(time_s)
+            look = dataclasses.replace(self._options.look, pose_s=time_s)
+            scene, losses = catalog.load_seen(self._options.scene, look, self._options.phase)
             self._time_s, self._renderer = time_s, self._of(scene)
             self.later_losses += [loss for loss in losses if _part_of(loss) not in self._told]
             self._told.update(map(_part_of, losses))
         return self._renderer
-
-    def _seen(self, time_s: float) -> tuple[Scene, tuple[str, ...]]:
-        look = dataclasses.replace(self._options.look, pose_s=time_s)
-        return catalog.load_seen(self._options.scene, look, self._options.phase)
 
     def _of(self, scene: Scene) -> Renderer:
         return Renderer(scene, self._options.device, self._options.threads or None, seed=self._options.seed)

@@ -29,7 +29,7 @@ def main() -> None:
     if options.explain:
         show(*explained(scene))
         return
-    found = render(options, scene)
+    found = render(options, scene, losses)
     show(*found.get("later_losses", ()))
     counts = f"{found['rendered_now']} rendered now, {found['nonfinite']} values not finite"
     show(f"{options.frames} frames ({counts}) in {options.out}")

@@ -65,8 +65,12 @@ def explained(scene: Scene) -> list[str]:
         return explanation(scene)
 
 
-def render(options: RenderOptions, scene: Scene) -> dict[str, Any]:
+def render(options: RenderOptions, scene: Scene, losses: tuple[str, ...]) -> dict[str, Any]:
     """Renders missing frames of a sequence, and its film if requested; returns the content of ``summary.json``.
+
+    Args:
+        options: of the command.
+        scene, losses: as of :func:`opened`.
 
     Raises:
         InputError: the machine or the input cannot provide what the options ask for.
@@ -89,7 +93,7 @@ def render(options: RenderOptions, scene: Scene) -> dict[str, Any]:
         size = options.size_px((scene.film.width_px, scene.film.height_px))
         check_frame_size(*size, 1 if options.samples else options.samples_per_axis)
         own_results(options.out, ["film.mp4"] if options.format == "mp4" else [])
-        posing = Posing(options, scene)
+        posing = Posing(options, scene, losses)
         kinds = options.point_set, options.seed, options.space_filter
         count = options.samples // (options.in_rounds or 1)
         plan = (

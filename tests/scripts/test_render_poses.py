@@ -10,7 +10,7 @@ import pytest
 from PIL import Image
 
 from renderer.tables import materials
-from scenes import models
+from scenes import catalog, models
 from scenes.models import gltf_textures
 from tests.scenes.models.files import QUAD_UVS
 from tests.scenes.models.test_poses import channel, with_morphs
@@ -68,11 +68,13 @@ def test_layers_are_those_of_the_pose(
 @pytest.mark.parametrize("integrator", ["whitted", "path"])
 def test_a_model_is_read_once(integrator: str, monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     read: list[float] = []
-    real = models._read
+    made: list[str] = []
+    real, seen = models._read, catalog.load_seen
     monkeypatch.setattr(models, "_read", lambda *given: (read.append(given[4]), real(*given))[1])
+    monkeypatch.setattr(catalog, "load_seen", lambda *given: (made.append(given[0]), seen(*given))[1])
     options = "--integrator", integrator, *SIZE, "--out", str(tmp_path / "out")
     assert call_script("render.py", monkeypatch, raised(tmp_path), *options) == 0
-    assert read == [0.0]
+    assert read == [0.0] and len(made) == 1, "and its scene is made once"
 
 
 @pytest.mark.parametrize("integrator", ["whitted", "path"])
