@@ -58,11 +58,11 @@ def _whole(content: bytes) -> bytes:
         SceneError: a binary file has fewer triangles.
     """
     start, each = 84, 50
-    if len(content) < start or content.lstrip()[:5].lower() == b"solid":  # text, or binary with such a header
-        return content
     count = int.from_bytes(content[start - 4 : start], "little")
-    if len(content) < start + each * count:
+    if len(content) >= start + each * count:  # never of a text, whose letters are the count of a huge file
+        return content[: start + each * count]
+    if b"\0" in content[:start]:
         raise SceneError(
-            f"cannot be read: expected {count} triangles as its header says, got {(len(content) - start) // each}"
+            f"cannot be read: expected {count} triangles as its header says, got {max(len(content) - start, 0) // each}"
         )
-    return content[: start + each * count]
+    return content

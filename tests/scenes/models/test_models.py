@@ -105,15 +105,22 @@ def test_vertex_colours_and_files_without_any(tmp_path: Path) -> None:
     assert read_model(tmp_path / "red.ply")[0].material.diffuse.value == pytest.approx((1.0, 0.0, 0.0))
 
 
-def test_binary_stl_with_bytes_behind_its_triangles_and_with_too_few(tmp_path: Path) -> None:
-    """Some programs append data; a file that was cut off says so."""
-    content = trimesh.creation.box().export(file_type="stl")
+@pytest.mark.parametrize("header", [b"by a program", b"solid box"])
+def test_binary_stl_with_bytes_behind_its_triangles_and_with_too_few(header: bytes, tmp_path: Path) -> None:
+    """Some programs append data; a file that was cut off says so, also where its header begins like a text."""
+    content = header.ljust(80) + trimesh.creation.box().export(file_type="stl")[80:]
     path = tmp_path / "in.stl"
     path.write_bytes(content + b"appended")
     assert len(read_model(path)[0].shape.faces) == 12
     path.write_bytes(content[:-60])
     with pytest.raises(SceneError, match="expected 12 triangles as its header says, got 10"):
         read_model(path)
+
+
+def test_stl_as_text_with_a_byte_order_mark(tmp_path: Path) -> None:
+    path = tmp_path / "in.stl"
+    path.write_bytes(b"\xef\xbb\xbf" + trimesh.creation.box().export(file_type="stl_ascii").encode())
+    assert len(read_model(path)[0].shape.faces) == 12
 
 
 def test_a_model_is_placed_with_all_its_parts(tmp_path: Path) -> None:
