@@ -175,12 +175,17 @@ class GltfData:
         made[at[:, 0].astype(np.int64)] = rows
         return made
 
+    def image_file(self, index: int) -> str:
+        """The file name of an image; empty if it is embedded."""
+        uri = self.at("images", index).get("uri", "")
+        return "" if uri.startswith("data:") else uri
+
     def image_bytes(self, index: int) -> tuple[str, io.BytesIO | None]:
         """The file name of an image and None, or a name for messages and the embedded content."""
-        image = self.at("images", index)
+        name, image = self.image_file(index), self.at("images", index)
+        if name:
+            return name, None
         uri = image.get("uri", "")
-        if uri and not uri.startswith("data:"):
-            return uri, None
         if not uri and "bufferView" not in image:
             raise misplaced(f"images[{index}]", "a uri or a bufferView", "none")
         content = self.resource(uri, f"images[{index}]", "an image at") if uri else self.view(image["bufferView"])

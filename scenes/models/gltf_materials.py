@@ -10,6 +10,7 @@ KHR_materials_ior, KHR_materials_transmission, KHR_materials_unlit, KHR_material
 
 from __future__ import annotations
 
+import copy
 from dataclasses import dataclass
 from typing import Any
 
@@ -107,9 +108,11 @@ class GltfMaterials:
 
     def _without_missing(self, given: dict[str, Any], where: str) -> dict[str, Any]:
         """A material without the textures whose pictures are missing, and without emission where its texture is."""
-        rough, changed = dict(_rough(given)), dict(given)
+        changed = copy.deepcopy(given)
+        rough, through = _rough(changed), changed.get("extensions", {}).get("KHR_materials_transmission", {})
         parts = [(rough, "baseColorTexture"), (rough, "metallicRoughnessTexture"), (changed, "emissiveTexture")]
-        for part, name in (*parts, *([(changed, "normalTexture")] if self._facets else [])):
+        along_paths = [(changed, "normalTexture"), (through, "transmissionTexture")]
+        for part, name in (*parts, *(along_paths if self._facets else [])):
             lookup = lookup_of(part.get(name))
             missing = "" if lookup is None else self.textures.missing(lookup)
             if missing:
@@ -117,7 +120,8 @@ class GltfMaterials:
                 became = "no emission" if shines else "left out"
                 self.report.add(where, f"the picture {missing!r}, which is missing", became)
                 del part[name]
-                changed |= {"pbrMetallicRoughness": rough} | ({"emissiveFactor": [0.0, 0.0, 0.0]} if shines else {})
+                if shines:
+                    changed["emissiveFactor"] = [0.0, 0.0, 0.0]
         return changed
 
     def _material(

@@ -160,8 +160,8 @@ class GltfTextures(Textures):
         return self._opacities[source]
 
     def missing(self, lookup: Lookup) -> str:
-        name, content = self.data.image_bytes(self._source(lookup))
-        return name if content is None and self.data.sources.find(name) is None else ""
+        name = self.data.image_file(self._source(lookup))
+        return name if name and self.data.sources.find(name) is None else ""
 
     def _source(self, lookup: Lookup) -> int:
         texture = self.data.at("textures", lookup.texture)
