@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 _LINES_MOST = 1 << 20  # bytes
 _RESOLUTION = re.compile(rb"([+-])([XY]) +(\d+) +([+-])([XY]) +(\d+)\s*$")
+_EXPOSURES = 1e-30, 1e30  # with others, values of most pictures would be infinite or 0
 _ORDER = {b"Y": b"-", b"X": b"+"}
 _FORMATS = {b"32-bit_rle_rgbe": False, b"32-bit_rle_xyze": True}
 XYZ = (1.0, 0.0, 0.0, 1.0, 0.0, 0.0, 1.0 / 3.0, 1.0 / 3.0)
@@ -73,8 +74,11 @@ def header_of(path: Path) -> RadianceHeader | None:
             divisor *= _numbers(name, value, 1 if name == b"EXPOSURE" else 3)
         elif name == b"PRIMARIES" and not kinds[-1]:
             chromaticities = tuple(_numbers(name, value, 8).tolist())
-    if not (np.isfinite(divisor) & (divisor > 0.0)).all():
-        raise ValueError(f"expected positive exposures, got {divisor.max():g}")
+    if not ((divisor >= _EXPOSURES[0]) & (divisor <= _EXPOSURES[1])).all():
+        least, most = _EXPOSURES
+        raise ValueError(
+            f"expected exposures from {least:g} to {most:g}, got {', '.join(f'{one:g}' for one in divisor)}"
+        )
     first, axis, count, second, other, length = size.groups()
     if axis == other:
         raise ValueError(f"expected X and Y, got {size.group().decode()}")
