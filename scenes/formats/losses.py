@@ -89,20 +89,21 @@ class LossReport:
         """All losses, in the order in which they were added."""
         return tuple(self._losses)
 
+    def _alike(self) -> list[list[Loss]]:
+        """Losses in the order of their kinds, equal ones at several places together."""
+        kinds: dict[tuple[str, str, bool], list[Loss]] = {}
+        for loss in self._losses:
+            kinds.setdefault((loss.what, loss.became, loss.picture), []).append(loss)
+        return list(kinds.values())
+
     def rows(self) -> list[dict[str, Any]]:
         """The losses as JSON objects: of equal losses the first ten places, the last of them with the number of all
         others, ``more``."""
         made: list[dict[str, Any]] = []
-        counts: dict[tuple[str, str, bool], int] = {}
-        lasts: dict[tuple[str, str, bool], dict[str, Any]] = {}
-        for loss in self._losses:
-            kind = loss.what, loss.became, loss.picture
-            counts[kind] = counts.get(kind, 0) + 1
-            if counts[kind] <= _LISTED:
-                lasts[kind] = asdict(loss)
-                made.append(lasts[kind])
-            else:
-                lasts[kind]["more"] = counts[kind] - _LISTED
+        for alike in self._alike():
+            made += map(asdict, alike[:_LISTED])
+            if len(alike) > _LISTED:
+                made[-1]["more"] = len(alike) - _LISTED
         return made
 
     def lines(self) -> list[str]:
@@ -110,14 +111,11 @@ class LossReport:
         line."""
         made = []
         for picture, title in ((True, "changes the picture"), (False, "hints to the renderer, which it does not need")):
-            places: dict[tuple[str, str], list[str]] = {}
-            for loss in self._losses:
-                if loss.picture == picture:
-                    places.setdefault((loss.what, loss.became), []).append(loss.where)
-            made += [f"{title}:"] if places else []
-            for (what, became), found in places.items():
-                more = f" (and {len(found) - 1} more)" if len(found) > 1 else ""
-                made.append(f"  {found[0]}{more}: {what}: {became}")
+            kinds = [alike for alike in self._alike() if alike[0].picture == picture]
+            made += [f"{title}:"] if kinds else []
+            for first, *others in kinds:
+                more = f" (and {len(others)} more)" if others else ""
+                made.append(f"  {first.where}{more}: {first.what}: {first.became}")
         return made
 
     def text(self) -> str:
