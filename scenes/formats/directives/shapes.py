@@ -86,11 +86,11 @@ class ShapeReader:
             raise SceneError(f"{parameters.place}: phimax: expected an angle in (0, 360], got {turn:g}")
         place = UNMOVED
         if kind == "sphere":
-            low, high = parameters.number("zmin", -radius), parameters.number("zmax", radius)
+            low, high = sorted((parameters.number("zmin", -radius), parameters.number("zmax", radius)))
             whole = turn == 360.0 and low <= -radius and high >= radius
             if whole and not turn_over:
                 return Sphere(radius), UNMOVED
-            if not min(low, high) < radius or not max(low, high) > -radius or low == high:
+            if not low < radius or not high > -radius or low == high:
                 raise SceneError(f"{parameters.place}: zmin, zmax: expected heights within the sphere")
             if whole:
                 mesh, place = as_mesh(Sphere()), np.diag([radius, radius, radius, 1.0])
@@ -107,7 +107,7 @@ class ShapeReader:
             mesh = revolution.ring(radius, inner, height, turn)
         elif kind == "cylinder":
             heights = parameters.number("zmin", -1.0), parameters.number("zmax", 1.0)
-            mesh = revolution.cylinder(radius, *_apart(heights, parameters), turn)
+            mesh = revolution.cylinder(radius, *sorted(_apart(heights, parameters)), turn)
         elif kind == "cone":
             mesh = revolution.cone(radius, *_apart((0.0, parameters.number("height", 1.0)), parameters)[1:], turn)
         elif kind == "paraboloid":

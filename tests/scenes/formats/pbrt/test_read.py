@@ -232,3 +232,12 @@ def test_subdivision_surfaces_have_the_levels_of_their_file(tmp_path: Path) -> N
         assert isinstance(found.shape, Mesh) and len(found.shape.faces) == count and len(lost) == 1
     corner = pbrt(tmp_path, f'Shape "loopsubdiv" {points}')[0].instances[0].shape.vertices[0]  # type: ignore[union-attr]
     assert corner == pytest.approx((0.2, 0.2, 0.2), abs=0.01)
+
+
+@pytest.mark.parametrize("kind", ["sphere", "cylinder"])
+@pytest.mark.parametrize("height", [0.5, 1.0])
+def test_heights_may_come_in_any_order(kind: str, height: float, tmp_path: Path) -> None:
+    """The outside is where it is for the other order."""
+    ends = [f'"float zmin" {low} "float zmax" {-low}' for low in (-height, height)]
+    first, second = (pbrt(tmp_path, f'Shape "{kind}" {both}\n')[0] for both in ends)
+    assert difference(first, second) is None
