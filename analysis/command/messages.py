@@ -81,8 +81,8 @@ def _in_words(kind: str) -> str:
     """A kind of value as one says it, such as ``6 numbers``."""
     kind = re.sub(r"[{}]", "", kind)
     names = kind.split()
-    if len(names) > 1 and set(names) == {"FLOAT"}:
-        return f"{len(names)} numbers"
+    if len(names) > 1 and set(names) in ({"INT"}, {"FLOAT"}):
+        return f"{len(names)} {_IN_WORDS[f'[{names[0]} [{names[0]} ...]]']}"
     return _IN_WORDS.get(kind, kind)
 
 

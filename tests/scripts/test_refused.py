@@ -93,6 +93,7 @@ REFUSED: dict[str, tuple[str, ...]] = {
     "render fly-by --time-s inf": ("time_s", "inf"),
     "render fly-by --samples-per-axis 65": ("samples_per_axis", "65"),
     "render fly-by --camera 1 2 3": ("--camera: expected 6 numbers or a name, got '1', '2', '3'",),
+    "render fly-by --crop 1 2 3 x": ("--crop: expected 4 whole numbers, got '1', '2', '3', 'x'",),
     "render fly-by --format gif": ("gif", "png"),
     "render fly-by --phase 1": ("phase", "1.0"),
     "render fly-by --threads -1": ("threads", "-1"),
