@@ -22,6 +22,8 @@ _IN_WORDS = {
     "PATH": "a file",
     "[INT [INT ...]]": "whole numbers",
     "[FLOAT [FLOAT ...]]": "numbers",
+    "[STR [STR ...]]": "names",
+    "[PATH [PATH ...]]": "files",
 }
 _CHOICE = re.compile(
     r"invalid choice '(?P<got>.*)' for argument '(?P<name>--\S+)'\. Expected one of (?P<all>\(.*\))\.$"
@@ -81,7 +83,7 @@ def _in_words(kind: str) -> str:
     """A kind of value as one says it, such as ``6 numbers``."""
     kind = re.sub(r"[{}]", "", kind)
     names = kind.split()
-    if len(names) > 1 and set(names) in ({"INT"}, {"FLOAT"}):
+    if len(names) > 1 and len(set(names)) == 1:
         return f"{len(names)} {_IN_WORDS[f'[{names[0]} [{names[0]} ...]]']}"
     return _IN_WORDS.get(kind, kind)
 

@@ -27,6 +27,7 @@ REFUSED: dict[str, tuple[str, ...]] = {
     "accelerators --triangles 3": ("triangles", "between 16", "3"),
     "accelerators --image-scale 0": ("image_scale", "0"),
     "accelerators --image report-three": ("report-three",),
+    "bench --compare a": ("--compare: expected 2 files, got 'a'",),
     "bench --only order,nonsense": ("only", "nonsense"),
     "bench --repetitions 3": ("repetitions", "3"),
     "bench --resolution-px 100": ("resolution_px", "100"),
