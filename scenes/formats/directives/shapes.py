@@ -106,8 +106,8 @@ class ShapeReader:
                 raise SceneError(f"{parameters.place}: innerradius: expected less than the radius, got {inner:g}")
             mesh = revolution.ring(radius, inner, height, turn)
         elif kind == "cylinder":
-            heights = parameters.number("zmin", -1.0), parameters.number("zmax", 1.0)
-            mesh = revolution.cylinder(radius, *sorted(_apart(heights, parameters)), turn)
+            heights = _apart((parameters.number("zmin", -1.0), parameters.number("zmax", 1.0)), parameters)
+            mesh = revolution.cylinder(radius, min(heights), max(heights), turn)
         elif kind == "cone":
             mesh = revolution.cone(radius, *_apart((0.0, parameters.number("height", 1.0)), parameters)[1:], turn)
         elif kind == "paraboloid":
