@@ -77,8 +77,8 @@ def read_whole(path: Path, report: LossReport | None = None, facets: bool = Fals
 
     Raises:
         ModuleNotFoundError: USD needs the package usd-core.
-        SceneError: the file is missing, has an unsupported format or cannot be read; it has no faces or non-finite
-            vertices; or one of its texture or material files is missing.
+        SceneError: the file, or a buffer of a glTF file, is missing; it has an unsupported format or cannot be read; or
+            it has no faces or non-finite vertices. Pictures and material libraries that are missing are losses.
     """
     path, report = Path(path), report or LossReport()
     _, _, model, losses = _at(path, facets, 0.0)
