@@ -178,6 +178,8 @@ def main() -> None:
     parser.add_argument("--out", type=Path, default=Path("docs/pictures"), help="folder for the pictures")
     parser.add_argument("--report", type=Path, default=Path("out/demo/report.html"), help="page of a finished run")
     given = parser.parse_args()
+    if given.what == "page" and not given.report.is_file():
+        parser.error(f"--report: expected the page of a finished run, found none at {given.report}")
     folder = given.out.resolve()
     folder.mkdir(parents=True, exist_ok=True)
     if given.what == "page":
