@@ -3,6 +3,10 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from math import sqrt
+
+SMALL_PX = 256
+"""Side of a square picture below which cycles are longer, pixels."""
 
 
 @dataclass(frozen=True)
@@ -22,8 +26,8 @@ class FilterOptions:
         latency_cycles: cycles from the start of a cycle to the display of its picture, at least 1.
         noise: whether noise is told from detail, in scenes whose samples draw random numbers.
         wavelets: whether roughness and change are measured by the wavelets of the dissertation.
-        share_max: maximum number of samples of a cycle, as a share of the output's pixels; a larger batch is divided
-            into several cycles.
+        share_max: maximum number of samples of a cycle, as a share of the output's pixels, in pictures of at least
+            :data:`SMALL_PX` squared; a larger batch is divided into several cycles.
         footprint: number of samples along a pixel's side for which textures are filtered.
         life_min_s, life_max_s: bounds of the time for which a sample is assumed to be useful, seconds.
         reach: distance after which a moving surface is assumed to be out of sight, as a share of the image's side.
@@ -48,6 +52,12 @@ class FilterOptions:
     life_max_s: float = 4.0
     reach: float = 0.125
     memory_s: float = 0.2
+
+    def samples_max(self, pixels: int) -> int:
+        """Maximum number of samples of a cycle in a picture of so many pixels. Below ``SMALL_PX`` squared the share
+        grows with the root of ``SMALL_PX`` over the side, because a tile covers more of a small picture."""
+        longer = sqrt(SMALL_PX / sqrt(min(pixels, SMALL_PX**2)))
+        return min(pixels, int(self.share_max * longer * pixels))
 
 
 DEFAULT = FilterOptions()

@@ -7,7 +7,7 @@ residuals it learns how fast the picture changes, and from the shadows of moving
 shows the estimates, blended with their surroundings where they are uncertain. ``filter`` omits the reprojection.
 
 The framelets of a cycle are tiles of 8 x 8 samples. A batch of more than a 32nd of the output's pixels is divided into
-several cycles, which keeps the latency low.
+several cycles, which keeps the latency low; in pictures below 256 x 256 pixels cycles are longer.
 """
 
 from __future__ import annotations
@@ -98,7 +98,7 @@ class Filter(Policy[State]):
         self._stages, self._own_threads = stages.filtering, stages.own_threads
         self._view = setting.view if options.reprojection else None
         self._noisy = options.noise and options.smoothing and setting.random()
-        most = int(options.share_max * self.config.pixels) // TILE_SIDE**2
+        most = options.samples_max(self.config.pixels) // TILE_SIDE**2
         asked = self.config.batch_size * self.config.samples // TILE_SIDE**2
         self._tiles = max(1, min(asked, most))
         cell = morton_to_raster(TILE_SIDE)

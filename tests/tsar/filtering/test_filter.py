@@ -132,8 +132,23 @@ def test_every_part_can_be_left_out(part: str) -> None:
 def test_every_sample_that_is_charged_is_asked_for() -> None:
     policy = POLICIES["tsar"](Setting(CONFIG, view=panned(0.0).view))
     _, batch = policy.request(policy.start(), Moment(0.0, 0, CYCLE_S))
-    assert batch.position[..., 0].numel() == policy.price.samples <= 64**2 / 32
+    assert batch.position[..., 0].numel() == policy.price.samples == 64**2 / 16
     assert batch.times.min() == 0.0 and batch.times.max() < CYCLE_S
+
+
+@pytest.mark.parametrize(
+    ("side", "share", "most"),
+    [
+        (32, 1 / 32, 90),
+        (64, 1 / 32, 256),
+        (128, 1 / 32, 724),
+        (256, 1 / 32, 2048),
+        (1024, 1 / 32, 32768),
+        (64, 1, 4096),
+    ],
+)
+def test_cycles_of_small_pictures_are_longer(side: int, share: float, most: int) -> None:
+    assert FilterOptions(share_max=share).samples_max(side * side) == most
 
 
 ARITHMETIC = {
