@@ -63,7 +63,7 @@ SCENES: Named[MakeScene] = Named(
     "scene",
     "tsar.scenes",
     {
-        **{name: _driving(name) for name in (*NAMES, animations.CUTS)},
+        **{name: _driving(name) for name in (*NAMES, animations.CUTS, animations.STILL)},
         **{name: _without_phases(name, _blurred) for name in BLUR_SCENES},
         **{name: _without_phases(name, effects.load) for name in effects.EFFECTS},
         **{name: _without_phases(name, report.load) for name in report.IMAGES},

@@ -48,6 +48,7 @@ class Scale:
         reference_rate_hz: reference images per second.
         reference_samples_per_axis: samples along a pixel's side of the finest output resolution.
         stride: interval, in reference images, at which FLIP, SSIM and the causes are taken.
+        widest_px: side of the study's finest pictures at the thesis' own size, pixels; by default that of table 7.2.
     """
 
     divisor: int
@@ -55,12 +56,13 @@ class Scale:
     reference_rate_hz: float
     reference_samples_per_axis: int
     stride: int
+    widest_px: int = max(side for _, side in ROWS)
 
     @property
     def reference_px(self) -> int:
-        """Side of the reference, which is that of the finest row. Coarser rows use its average (Stephens 2011, sec.
-        7.2.3)."""
-        return max(side for _, side in ROWS) // self.divisor
+        """Side of the reference, which is that of the finest pictures. Coarser ones use its average (Stephens 2011,
+        sec. 7.2.3)."""
+        return self.widest_px // self.divisor
 
     @property
     def errors_alone(self) -> Scale:

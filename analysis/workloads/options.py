@@ -10,6 +10,7 @@ from analysis.command import limits
 from analysis.command.cluster import ClusterOptions
 from analysis.command.options import REFERENCES, References, Unprefixed
 from analysis.study.asked import require_distinct, require_inputs, require_named
+from analysis.study.cases import SCALES
 from analysis.study.inputs import INPUTS
 from tsar.config import TsarConfig, closed_choices, require
 from tsar.policies import POLICIES, RIVALS
@@ -30,8 +31,8 @@ class WorkloadOptions:
     image_hz: tuple[float, ...] = (32.0, 8.0, 2.0)
     """Images a second of the framed renderer: the fewer they are, the more moves from one to the next."""
     sides_px: tuple[int, ...] = (512,)
-    """Output sides at the thesis' own size, powers of two up to 1024; batches have an eighth as many samples as there
-    are pixels."""
+    """Output sides at the thesis' own size, powers of two from 128 to 4096, and at least 64 pixels at the scale;
+    batches have an eighth as many samples as there are pixels. The reference of sides above 1024 is as wide."""
     scale: Literal["thesis", "half", "quick"] = "quick"
     """Sizes of the runs: as in the suitability study."""
     repetitions: int = 1
@@ -53,6 +54,7 @@ class WorkloadOptions:
         for name, (least, most) in {"sample_flops": (1.0, 1e9), "image_hz": (0.5, 1000.0)}.items():
             ok = all(least <= one <= most for one in getattr(self, name))
             require(ok, name, f"numbers between {least:g} and {most:g}", getattr(self, name))
-        ok = all(256 <= side <= 1024 and side & (side - 1) == 0 for side in self.sides_px)
-        require(ok, "sides_px", "256, 512 or 1024", self.sides_px)
+        least = max(128, 64 * SCALES[self.scale].divisor)
+        ok = all(least <= side <= 4096 and side & (side - 1) == 0 for side in self.sides_px)
+        require(ok, "sides_px", f"powers of two from {least} to 4096 at scale {self.scale}", self.sides_px)
         limits.within(self, repetitions=limits.REPETITIONS)

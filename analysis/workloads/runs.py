@@ -64,8 +64,11 @@ def _runs_at(
     options: WorkloadOptions, policies: tuple[str, ...], workload: Workload, name: str, repetition: int
 ) -> Iterator[Run]:
     scale = SCALES[options.scale].errors_alone
-    batch = _BATCH * (workload.side_px // (_SIDE // 2)) ** 2 // 4
-    config = scale.sized(batch, workload.side_px, dataclasses.replace(options.tsar, seed=repetition))
+    scale = dataclasses.replace(scale, widest_px=max(scale.widest_px, workload.side_px))
+    batch = _BATCH * workload.side_px**2 // _SIDE**2
+    cache = max(options.tsar.cache_size, 4 * batch)
+    base = dataclasses.replace(options.tsar, seed=repetition, cache_size=cache)
+    config = scale.sized(batch, workload.side_px, base)
     segments = workload.sample_flops / float(per_segment(CostParameters()))
     for policy in policies:
         try:

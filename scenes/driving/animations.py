@@ -110,7 +110,7 @@ ANIMATIONS: dict[str, Animation] = {
 }
 """Animations by name, in the order of the thesis' inputs 0 to 4."""
 
-CUTS = "cuts"
+CUTS, STILL = "cuts", "still"
 _CUT_S = 0.25
 _FURTHER = {
     # nothing on the picture stays at a cut; between cuts it moves as in chase and fly-by
@@ -123,6 +123,10 @@ _FURTHER = {
             _chase(-6.0, -2.4, 1.2, 0.6, 50.0),
         ),
     ),
+    # nothing moves: approach, halfway
+    STILL: Animation(
+        Path((-28.0, _LANE_M), 0.0, 0.0, advance=16.0), _fixed((3.4, 0.4, 1.35), (-10.0, -1.9, 0.75), 42.0)
+    ),
 }
 """Animations that are no input of the thesis."""
 
@@ -131,7 +135,7 @@ def load(name: str, phase: float = 0.0) -> Scene:
     """The scene of an animation.
 
     Args:
-        name: a key of :data:`ANIMATIONS`, or :data:`CUTS`.
+        name: a key of :data:`ANIMATIONS`, :data:`CUTS`, or :data:`STILL`.
         phase: fraction of a wheel's turn by which the car is ahead at time zero: a repetition that differs only in the
             positions of edges on pixels and tiles.
     """

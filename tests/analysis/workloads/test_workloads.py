@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from typing import Any, cast
 
 import numpy as np
 import pandas as pd
@@ -14,6 +15,7 @@ from analysis.workloads.options import WorkloadOptions
 from analysis.workloads.plots import figure
 from analysis.workloads.runs import UNPRICED, Run, Workload, runs
 from analysis.workloads.tables import RunResult, map_table, paying_table, pays_from, policy_table, shown_tables
+from tsar.config import ConfigError
 from tsar.policies import POLICIES
 from tsar.policy import Setting
 
@@ -46,11 +48,18 @@ def test_what_is_charged_for_samples_alone_runs_once_for_all_prices() -> None:
     assert len({run.case for run in planned if run.policy == "tsar"}) == 4
 
 
-@pytest.mark.parametrize("side", [256, 512, 1024])
+@pytest.mark.parametrize("side", [128, 256, 512, 1024, 4096])
 def test_batches_have_an_eighth_as_many_samples_as_pixels(side: int) -> None:
     options = WorkloadOptions(inputs=("chase",), policies=("tsar",), sides_px=(side,), scale="thesis")
     case = next(run.case for run in runs(options) if not is_framed(run.policy))
     assert case is not None and case.tsar.batch_size * case.tsar.samples == side**2 // 8
+    assert case.scale.reference_px == max(1024, side)
+
+
+@pytest.mark.parametrize(("side", "scale"), [(64, "thesis"), (128, "quick"), (8192, "quick"), (384, "half")])
+def test_sides_that_no_row_can_have_are_refused(side: int, scale: str) -> None:
+    with pytest.raises(ConfigError, match=f"sides_px: expected powers of two from .* at scale {scale}, got"):
+        WorkloadOptions(sides_px=(side,), scale=cast(Any, scale))
 
 
 def test_a_policy_without_time_for_a_cycle_has_no_case() -> None:

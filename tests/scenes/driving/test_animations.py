@@ -73,6 +73,15 @@ def test_cuts_show_another_view_every_quarter_of_a_second() -> None:
         assert (high > 0.1).all() and (low < 0.9).all(), time_s
 
 
+def test_nothing_moves_in_still() -> None:
+    scene = catalog.load("still")
+    moved = [np.ptp(np.concatenate([one.track.translation, one.track.rotation], axis=1), axis=0)
+             for one in scene.instances if one.track is not None]  # fmt: skip
+    assert moved and not np.any(moved) and camera(scene).track is None
+    low, high = shown(scene, 0.0)
+    assert (high > 0.1).all() and (low < 0.9).all() and "still" not in catalog.NAMES
+
+
 @pytest.mark.parametrize("name", ["", "nonsense", "5", "-1", "Chase", "1.0", "²", "../chase"])
 def test_unknown_names_are_refused(name: str) -> None:
     with pytest.raises(ConfigError, match=r"^scene: expected one of corner-exit, chase, .*, got ") as caught:
