@@ -9,8 +9,6 @@ from __future__ import annotations
 import ctypes
 import importlib.util
 import shutil
-import subprocess
-import tempfile
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
@@ -19,10 +17,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from analysis.bench.native_code import compiled
+
 Points = NDArray[np.float32]
 
 _LOOPS = Path(__file__).parent / "native" / "embree_loops.c"
-_TARGETS = {"native": "-march=native", "avx2": "-march=haswell", "avx512": "-march=skylake-avx512"}
 _HIGH_QUALITY = 2  # RTC_BUILD_QUALITY_HIGH: with spatial splits
 _ALL_FEATURES = 0xFFFFFFFF  # RTC_FEATURE_FLAG_ALL
 _COHERENT = 1 << 16  # RTC_RAY_QUERY_FLAG_COHERENT
@@ -202,12 +201,7 @@ def _library() -> ctypes.CDLL:
 @cache
 def _loops(isa: str) -> ctypes.CDLL:
     """The loops over the calls, compiled for an instruction set."""
-    with tempfile.TemporaryDirectory(prefix="tsar-embree-") as folder:
-        made = Path(folder) / "loops.so"
-        command = ["cc", "-O3", _TARGETS[isa], "-shared", "-fPIC", "-std=c11", "-o", str(made), str(_LOOPS)]
-        subprocess.run(command, check=True, capture_output=True)
-        lib = ctypes.CDLL(str(made))
-    pointer = ctypes.c_void_p
+    lib, pointer = compiled(_LOOPS, isa), ctypes.c_void_p
     lib.ask_embree.restype = None
     lib.ask_embree.argtypes = (ctypes.c_int, pointer, pointer, pointer, ctypes.c_long, *[pointer] * 5)
     return lib

@@ -21,6 +21,7 @@ GROUPS = (
     "features",
     "overhead",
     "tsar",
+    "bits",
     "growth",
     "large",
     "conversion",
@@ -28,10 +29,10 @@ GROUPS = (
 )
 """Groups of rows, in the order of the table."""
 
-ON_CPU_ONLY = ("coherent", "incoherent", "cores", "hits", "large", "conversion", "start")
+ON_CPU_ONLY = ("coherent", "incoherent", "cores", "hits", "bits", "large", "conversion", "start")
 """Groups that do not run on a GPU."""
 
-ON_ANY_ISA = ("coherent", "incoherent", "cores", "order", "hits", "overhead", "tsar", "growth", "large")
+ON_ANY_ISA = ("coherent", "incoherent", "cores", "order", "hits", "overhead", "tsar", "bits", "growth", "large")
 """Groups in which our side, and Embree, can be limited to an instruction set."""
 
 FRAMELET_SIDE = 16
@@ -48,7 +49,8 @@ class BenchOptions:
     summary-cuda.json."""
     only: Annotated[tuple[str, ...], tyro.conf.UseAppendAction] = ()
     """What to do, instead of everything; a group, or several with commas between; may be repeated. Without it all run:
-    coherent, incoherent, shaded, cores, order, hits, features, overhead, tsar, growth, large, conversion, start."""
+    coherent, incoherent, shaded, cores, order, hits, features, overhead, tsar, bits, growth, large, conversion,
+    start."""
     compare: tuple[Path, Path] | None = None
     """Two bench.json whose figures of our side are compared; nothing is run."""
     device: Literal["cpu", "cuda:0"] = "cpu"

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
+from analysis.bench.bits import bits
 from analysis.bench.conversion import conversion
 from analysis.bench.features import features
 from analysis.bench.growth import growth
@@ -38,6 +39,7 @@ MEASURED_BY: Mapping[str, Group] = {
     "features": features,
     "overhead": overhead,
     "tsar": policy,
+    "bits": bits,
     "growth": growth,
     "large": large,
     "conversion": conversion,
