@@ -26,7 +26,7 @@ from renderer.singles import SingleSamples
 from renderer.tables.accelerators import STRUCTURES, Structure
 from renderer.tables.buffers import build_buffers
 from renderer.tables.checks import check_frame_size
-from renderer.tables.origin import near_origin
+from renderer.tables.origin import Vector, near_origin
 from renderer.tables.requirements import lit_by_all, required
 from renderer.tables.viewing import camera_view, check_camera
 from renderer.viewpoints import viewpoint_of
@@ -63,6 +63,7 @@ class Renderer:
         seed: int = 0,
         structure: Structure | Literal["warp"] = "bvh",
         count_work: bool = False,
+        origin: Vector | None = None,
     ) -> None:
         """Builds acceleration structures and loads kernels.
 
@@ -70,8 +71,7 @@ class Renderer:
             scene: scene to render.
             device: ``cpu`` or ``cuda:0``.
             threads: number of host threads, by default one per core that this process may use.
-            footprint_resolution_px: see the class. It is the same for all batches, so that coarse and fine tiles, and
-                framed and adaptive renderers, are equally sharp.
+            footprint_resolution_px: see the class; the same for all batches, so that all tiles are equally sharp.
             throughput_cutoff: least throughput of a secondary ray; a chain of mirrors ends below it.
             packets: trace sixteen samples at a time if packets support all features of the scene (``cpu`` only);
                 otherwise one by one, as on other devices. Pictures differ by rounding.
@@ -83,6 +83,7 @@ class Renderer:
             count_work: count visited nodes and tested triangles, as ``node_visits`` and ``triangle_tests``; for single
                 samples on the CPU with the first three structures.
             seed: seed of the random numbers for lens, extended lights and glossy rays, 0 to 2^32 - 1.
+            origin: origin of the space in which rays are traced, scene units; by default one near the camera.
 
         Raises:
             SceneError: if the scene contains an unsupported part.
@@ -100,7 +101,7 @@ class Renderer:
         self.threads = threads or devices.core_count()
         self.footprint_resolution_px = float(footprint_resolution_px)
         check_camera(scene)
-        self.scene = scene = near_origin(lit_by_all(scene))
+        self.scene = scene = near_origin(lit_by_all(scene), origin)
         self._camera = check_camera(scene)
         needed = required(scene)
         if structure not in (*STRUCTURES, "warp"):
@@ -174,8 +175,7 @@ class Renderer:
         """
         if not math.isfinite(time_s):
             raise ValueError(f"time_s: expected a finite time, got {time_s}")
-        view = self._view(aspect, self.footprint_resolution_px)
-        self._pose(view, float(time_s))
+        _, view = self.posed(float(time_s), aspect, self.footprint_resolution_px)
         return viewpoint_of(self.buffers, view, float(time_s))
 
     def render_frame(self, time_s: float, width_px: int, height_px: int, samples_per_axis: int = 1) -> Tensor:
@@ -200,8 +200,7 @@ class Renderer:
             return grid_frame(self, float(time_s), width_px, height_px, samples_per_axis)
         target = torch.device(self.device)
         image = torch.empty(height_px, width_px, 3, device=target)
-        view = self._view(width_px / height_px, min(width_px, height_px) * samples_per_axis)
-        self._pose(view, float(time_s))
+        _, view = self.posed(float(time_s), width_px / height_px, min(width_px, height_px) * samples_per_axis)
         shared = samples_per_axis, wp.float64(time_s), wp.from_torch(image, dtype=wp.vec3)
         pixels = -(-width_px // BLOCK_PX) * -(-height_px // BLOCK_PX) * BLOCK_PX**2
         self._launch(self._kernels.render_pixels, view, shared, pixels)

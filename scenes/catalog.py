@@ -232,6 +232,27 @@ def load_seen(
     return (on_a_path(found, later) if later else found), losses  # type: ignore[arg-type]
 
 
+def poses_of(
+    scene: str | Path, look: Look, phase: float, camera_path: str, loaded: Scene
+) -> Callable[[float], Scene] | None:
+    """The scene as at a time in seconds, where parts of a model do not move rigidly; None where all do.
+
+    Args:
+        scene, look, phase, camera_path: as of :func:`load_seen`.
+        loaded: what it loaded.
+    """
+    from scenes.models.scenes_of_models import is_posed
+
+    if str(scene) in SCENES or not is_posed(scene, look.integrator == "path"):
+        return None
+
+    def at(time_s: float) -> Scene:
+        found, _ = load_seen(scene, dataclasses.replace(look, pose_s=time_s), phase, camera_path)
+        return dataclasses.replace(found, camera=loaded.camera) if camera_path else found
+
+    return at
+
+
 def load_any(
     scene: str | Path | Scene, phase: float = 0.0, camera_path: str = "", integrator: IntegratorName = "whitted"
 ) -> tuple[Scene, tuple[str, ...]]:

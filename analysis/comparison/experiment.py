@@ -8,17 +8,15 @@ from __future__ import annotations
 import dataclasses
 import time
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
-from functools import lru_cache, partial
 from typing import TYPE_CHECKING, Any
 
-from analysis.command.cli import InputError, bad_input, full_disk, require_memory
-from analysis.command.ownership import writable_folder
+from analysis.command.cli import InputError, bad_input, full_disk
 from analysis.command.start import first_imports, first_made
 from analysis.comparison.options import RunOptions
-from analysis.comparison.stored import FILES, Recording, added_by, complete_run, content_of, names_of
+from analysis.comparison.setup import Setup, prepare
+from analysis.comparison.stored import FILES, Recording, added_by, complete_run, content_of
 from analysis.metrics import METRICS
-from analysis.storage.results import SUMMARY, own_results
+from analysis.storage.results import SUMMARY
 
 if TYPE_CHECKING:
     from analysis.command.progress import Bars
@@ -29,57 +27,7 @@ if TYPE_CHECKING:
     from analysis.storage.records import RecordLimits
     from analysis.storage.reference import Reference
     from analysis.study.runs import PolicyRun
-    from renderer.trace import Renderer
     from scenes.canonical import Scene
-
-_BYTES_PER_PIXEL = 260  # bytes a pixel: images, age fields and samples of a run
-_BYTES_PER_PIXEL_SCORED = 6  # bytes a pixel and image: codes of a display and of the reference, kept for jod
-_BYTES_PER_CACHED_SAMPLE = 20  # bytes a sample of the cache: colours and wavelet coefficients
-
-
-@dataclass(frozen=True)
-class Setup:
-    """Inputs of a run before it starts."""
-
-    scene: Scene
-    renderer_of: Callable[[float], Renderer]
-    """Makes a renderer that filters textures for a given number of samples along a pixel's side."""
-    losses: tuple[str, ...] = ()
-
-
-def prepare(options: RunOptions, scene: Scene | None = None) -> Setup:
-    """Checks the machine, loads the scene unless one is given, and builds the renderer of the adaptive run.
-
-    Raises:
-        InputError: the machine or the input cannot provide what the options ask for.
-    """
-    with bad_input():
-        kept = _BYTES_PER_PIXEL_SCORED * options.images_scored if "jod" in options.further_metrics else 0
-        require_memory(options.pixels_held * (_BYTES_PER_PIXEL + kept), options.size)
-        slots = options.tsar.cache_slots
-        require_memory(slots * options.tsar.samples * _BYTES_PER_CACHED_SAMPLE, f"cache_size: {slots} framelets")
-    with first_imports():
-        from scenes import catalog
-
-    with bad_input():
-        scene, losses = catalog.load_seen(scene or options.input, options.look, options.phase, options.camera_path)
-        renderer_of = lru_cache(maxsize=8)(partial(_renderer, options, scene))
-        own_results(options.out, names_of(options))
-        writable_folder(options.references, "references")
-        renderer_of(1)  # an error of the scene's loader is bad input
-    for loss in losses:
-        print(loss)
-    return Setup(scene, renderer_of, losses)
-
-
-def _renderer(options: RunOptions, scene: Scene, axis: float) -> Renderer:
-    """A renderer that filters textures for ``axis`` samples along a pixel's side."""
-    with first_imports():
-        from renderer.stages.control import expect_stages
-        from renderer.trace import Renderer
-
-    expect_stages(options.stages)
-    return Renderer(scene, options.device, options.threads or None, min(options.tsar.shape) * axis)
 
 
 def run_experiment(options: RunOptions, began_s: float | None = None) -> dict[str, Any]:
@@ -154,12 +102,13 @@ def _limits(options: RunOptions) -> RecordLimits:
 
 
 def _reference(options: RunOptions, setup: Setup, count: int, bars: Any) -> Reference:
-    from analysis.storage.reference import ReferenceSpec, content_hash, obtain, renderer_hash
+    from analysis.storage.reference import ReferenceSpec, obtain, renderer_hash
+    from analysis.study.scenery import scene_hash
 
     (height, width), axis = options.tsar.shape, options.reference_samples_per_axis
     spec = ReferenceSpec(
         scene=f"{options.input} phase {options.phase:g}",
-        scene_hash=content_hash(setup.scene),
+        scene_hash=scene_hash(options.input, setup.scene, options.integrator == "path"),
         renderer_hash=renderer_hash(setup.renderer_of(1), options.device),
         start_s=options.start_s,
         rate_hz=options.reference_rate_hz,

@@ -16,11 +16,14 @@ from analysis.page.video import REFERENCE
 from analysis.tracer.layers import scene_layers
 from renderer.film.files import write_exr
 from renderer.film.layers import write_layers
+from renderer.posed import PosedRenderer, renderer_at
 from renderer.trace import Renderer
 from tsar.types import SampleMap
 
 
-def exr_writers(options: RunOptions, renderer: Renderer, count: int) -> list[Callable[[DisplayedImages], None]]:
+def exr_writers(
+    options: RunOptions, renderer: Renderer | PosedRenderer, count: int
+) -> list[Callable[[DisplayedImages], None]]:
     """What writes the EXR files that a run is asked for; each is called at every reference time.
 
     Args:
@@ -48,7 +51,7 @@ class LayeredStills:
         numbers: of those reference times.
     """
 
-    def __init__(self, options: RunOptions, renderer: Renderer, count: int) -> None:
+    def __init__(self, options: RunOptions, renderer: Renderer | PosedRenderer, count: int) -> None:
         """Removes the files of an earlier run.
 
         Args:
@@ -72,7 +75,7 @@ class LayeredStills:
             return
         height, width = self._options.tsar.shape
         step_s = 1.0 / self._options.reference_rate_hz
-        scene = scene_layers(self._renderer, width, height, view.time_s, step_s)
+        scene = scene_layers(renderer_at(self._renderer, view.time_s), width, height, view.time_s, step_s)
         axis = self._options.reference_samples_per_axis
         exact = {"age": np.zeros((height, width)), "samples": np.full((height, width), axis**2)}
         self._write(REFERENCE, view, {"": view.reference.numpy(), **scene, **exact})

@@ -79,9 +79,11 @@ def content_of(options: RunOptions, scene: Scene) -> str:
     from analysis.storage.files import plain
     from analysis.storage.reference import content_hash
     from analysis.storage.source import code_hash
+    from scenes.models.scenes_of_models import content_of as content
 
+    facets = options.integrator == "path"
     kept = {name: value for name, value in plain(options).items() if name not in ("out", "references")}
-    return content_hash((kept, scene, code_hash(run_experiment), *added_by(options)))
+    return content_hash((kept, content(options.input, scene, facets), code_hash(run_experiment), *added_by(options)))
 
 
 def complete_run(options: RunOptions, summary: dict[str, Any]) -> dict[str, Any]:

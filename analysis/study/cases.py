@@ -272,5 +272,7 @@ def content_of(animation: MovingScene) -> str:
     """Hash of a scene that the source does not cover."""
     from analysis.storage.reference import content_hash
     from scenes import catalog
+    from scenes.models.scenes_of_models import content_of as content
 
-    return content_hash(catalog.load_any(animation.input, animation.phase, animation.camera_path)[0])
+    scene, _ = catalog.load_any(animation.input, animation.phase, animation.camera_path)
+    return content_hash(content(animation.input, scene, False))

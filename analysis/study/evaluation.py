@@ -40,6 +40,7 @@ from analysis.study.spending import spent
 from tsar.threads import one_thread
 
 if TYPE_CHECKING:
+    from renderer.posed import PosedRenderer
     from renderer.trace import Renderer
 
 
@@ -255,7 +256,7 @@ def _score(case: Case, seen: DisplayRecord) -> float | None:
 
 
 def _begin(case: Case, place: Resources, truths: Truths) -> PolicyRun:
-    def renderer_of(footprint: float) -> Renderer:
+    def renderer_of(footprint: float) -> Renderer | PosedRenderer:
         return renderer(case.animation, case.tsar.resolution_px * footprint, place.threads, case.tracing)
 
     machine = Machine(case.ledger, case.capacity, case.cost, case.samples_per_s)

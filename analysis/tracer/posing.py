@@ -4,17 +4,13 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Iterable
-from pathlib import Path
 from typing import Any
-
-import numpy as np
 
 from analysis.tracer.render_options import RenderOptions
 from renderer.trace import Renderer
 from scenes import catalog
 from scenes.canonical import Scene
-from scenes.models import files_of
-from scenes.models.scenes_of_models import is_posed
+from scenes.models.scenes_of_models import content_of, is_posed
 
 ANEW = "what does not move rigidly is read anew for each frame, and stands still while the shutter is open"
 
@@ -58,9 +54,7 @@ class Posing:
     @property
     def content(self) -> Any:
         """Everything in the input that decides the pictures: the scene, and the files of a model that is posed."""
-        if not self.anew:
-            return self._scene
-        return self._scene, [np.fromfile(path, np.uint8) for path in files_of(Path(self._options.scene), self._facets)]
+        return content_of(self._options.scene, self._scene, self._facets)
 
 
 def _part_of(loss: str) -> str:

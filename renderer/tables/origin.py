@@ -35,25 +35,52 @@ _COARSE = 1.0e-3
 Vector = NDArray[np.float64]
 
 
-def near_origin(scene: Scene) -> Scene:
-    """The scene, moved so that the part near the camera at time zero lies near the origin; the same object if it does
-    already.
+def near_origin(scene: Scene, origin: Vector | None = None) -> Scene:
+    """The scene, moved so that an origin becomes zero; the same object if it does already.
 
-    The shift is a multiple of a power of two that depends on the sizes in the scene. So a scene gives the same picture
-    at any place, and the same bits if its displacement is such a multiple. Warns of instances that are still too far
-    away.
+    Warns of instances that are still too far away.
+
+    Args:
+        scene: scene to move.
+        origin: the new origin, scene units; by default :func:`origin_of` the scene.
     """
+    origin = origin_of(scene) if origin is None else origin
+    bounds = _all_bounds(scene)
+    if bounds is None:
+        return scene
+    for line in _too_coarse(scene, origin, np.max(bounds[1] - bounds[0], axis=1) / 2.0):
+        warnings.warn(line, stacklevel=3)
+    return _moved(scene, -origin) if origin.any() else scene
+
+
+def origin_of(scene: Scene) -> Vector:
+    """An origin near the part of the scene that lies near the camera at time zero; zero if that is near it already.
+
+    It is a multiple of a power of two that depends on the sizes in the scene. So a scene gives the same picture at any
+    place, and the same bits if its displacement is such a multiple.
+    """
+    bounds = _all_bounds(scene)
+    if bounds is None:
+        return np.zeros(3)
+    lower, upper = bounds
+    eye = _eye(scene)
+    return _shift(np.clip(eye, lower.min(axis=0), upper.max(axis=0)), lower, upper, np.max(upper - lower, axis=1) / 2.0)
+
+
+def _eye(scene: Scene) -> Vector:
+    with np.errstate(over="ignore", invalid="ignore"):
+        return product(_pose(getattr(scene.camera, "track", None)), scene.camera.to_world)[:3, 3]
+
+
+def _all_bounds(scene: Scene) -> tuple[Vector, Vector] | None:
+    """Lower and upper corners of the boxes of all instances; None if there are none, or if one, or the camera, is not
+    at a finite place."""
     with np.errstate(over="ignore", invalid="ignore"):
         bounds = [_bounds(instance) for instance in scene.instances]
-        eye = product(_pose(getattr(scene.camera, "track", None)), scene.camera.to_world)
-    if not bounds or not np.isfinite([*np.reshape(bounds, (-1, 3)), eye[:3, 3]]).all():
-        return scene
+    if not bounds or not np.isfinite([*np.reshape(bounds, (-1, 3)), _eye(scene)]).all():
+        return None
     lower, upper = (np.array(corners) for corners in zip(*bounds, strict=True))
-    half = np.max(upper - lower, axis=1) / 2.0
-    shift = _shift(np.clip(eye[:3, 3], lower.min(axis=0), upper.max(axis=0)), lower, upper, half)
-    for line in _too_coarse(scene, shift, half):
-        warnings.warn(line, stacklevel=3)
-    return _moved(scene, -shift) if shift.any() else scene
+    return lower, upper
 
 
 def _shift(seen: Vector, lower: Vector, upper: Vector, half: Vector) -> Vector:

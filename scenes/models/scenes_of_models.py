@@ -6,9 +6,11 @@ import dataclasses
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from scenes.canonical import Instance, Scene, SceneError
 from scenes.formats.losses import LossReport
-from scenes.models import MODEL_ENDINGS, read_whole
+from scenes.models import MODEL_ENDINGS, files_of, read_whole
 from scenes.viewing import Up, framed
 
 _Y_UP = (".obj", ".gltf", ".glb")
@@ -23,7 +25,20 @@ def model_up(path: Path, facets: bool = False) -> Up:
 def is_posed(scene: object, facets: bool) -> bool:
     """Whether a scene is the file of a model whose parts are read at one time, since they do not move rigidly."""
     path = Path(scene) if isinstance(scene, (str, Path)) else Path()
-    return path.suffix.lower() in MODEL_ENDINGS and read_whole(path, facets=facets).posed
+    return path.suffix.lower() in MODEL_ENDINGS and path.is_file() and read_whole(path, facets=facets).posed
+
+
+def content_of(scene: object, loaded: Scene, facets: bool) -> Any:
+    """Everything in the input that decides the pictures of a scene at all times: the scene, and the files of a model
+    that is posed.
+
+    Args:
+        scene, facets: as of :func:`is_posed`.
+        loaded: the scene as at one time.
+    """
+    if not is_posed(scene, facets):
+        return loaded
+    return loaded, [np.fromfile(path, np.uint8) for path in files_of(Path(str(scene)), facets)]
 
 
 def model_scene(

@@ -18,7 +18,8 @@ from PIL import Image
 import analysis.storage.reference
 from analysis.command import cli
 from analysis.command.cli import InputError
-from analysis.comparison.experiment import RunOptions, prepare, run_experiment
+from analysis.comparison.experiment import RunOptions, run_experiment
+from analysis.comparison.setup import prepare
 from analysis.storage.files import plain
 from renderer.film.files import read_exr
 from scenes import loading
