@@ -97,11 +97,15 @@ def read_values(path: Path) -> Pixels:
 
 
 def read_alpha(path: Path) -> Pixels:
-    """The opacity ``(h, w)`` of an image; 1 where the format has none that is read here."""
+    """The opacity ``(h, w)`` of an image; 1 where it has none.
+
+    Raises:
+        SceneError: the file cannot be read.
+    """
     try:
         return alpha_of(path)
-    except Exception:  # not a picture of Pillow's: one of floating-point numbers, or broken
-        return np.ones((1, 1), np.float32)
+    except Exception as error:  # decoders raise arbitrary exceptions on broken files
+        raise SceneError(f"texture {path}: cannot be read: {one_line(error)}") from error
 
 
 def is_linear(path: Path) -> bool:

@@ -7,9 +7,10 @@ bits; Pillow reads other files.
 from __future__ import annotations
 
 import warnings
+from collections.abc import Callable
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import TYPE_CHECKING, BinaryIO
+from typing import TYPE_CHECKING, BinaryIO, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,7 +22,9 @@ if TYPE_CHECKING:
     from OpenImageIO import ImageBuf
 
 Pixels = NDArray[np.float32]
+_Found = TypeVar("_Found")
 _RADIANCE = (".hdr", ".pic", ".rgbe")
+_PNG = b"\x89PNG\r\n\x1a\n"
 _WIDE = (".exr", ".pfm", ".png", ".tif", ".tiff", *_RADIANCE)
 
 PIXELS_MOST = 1 << 27
@@ -29,8 +32,8 @@ PIXELS_MOST = 1 << 27
 fit into memory; one pixel takes about 36 bytes while its scene is loaded."""
 
 
-def decoded(path: Path) -> Pixels | NDArray[np.uint8] | NDArray[np.uint16]:
-    """The values of an image: linear ones are float32, and integers are sRGB-encoded.
+def decoded(file: Path | BinaryIO) -> Pixels | NDArray[np.uint8] | NDArray[np.uint16]:
+    """The values of an image, or of its content: linear ones are float32, and integers are sRGB-encoded.
 
     Deviation: Radiance files from before 1991, whose run-length encoding repeats whole pixels, are rejected, as in
     other renderers.
@@ -43,11 +46,27 @@ def decoded(path: Path) -> Pixels | NDArray[np.uint8] | NDArray[np.uint16]:
     Raises:
         ValueError, OSError or other exceptions of the decoders: the file cannot be read.
     """
-    header = _header_of(path)
+    if not isinstance(file, Path):
+        return _of_content(file, decoded) if _is_png(file) else by_pillow(file)
+    header = _header_of(file)
     if header is not None:
-        return _radiance(path, header)
-    found = _wide(path) if path.suffix.lower() in _WIDE else None
-    return by_pillow(path) if found is None else found
+        return _radiance(file, header)
+    found = _wide(file) if file.suffix.lower() in _WIDE else None
+    return by_pillow(file) if found is None else found
+
+
+def _is_png(content: BinaryIO) -> bool:
+    start = content.read(len(_PNG))
+    content.seek(0)
+    return start == _PNG
+
+
+def _of_content(content: BinaryIO, read: Callable[[Path], _Found]) -> _Found:
+    """What a decoder of files makes of the content of a PNG file."""
+    with TemporaryDirectory() as folder:
+        path = Path(folder) / "content.png"
+        path.write_bytes(content.read())
+        return read(path)
 
 
 def chromaticities_of(path: Path) -> tuple[float, ...] | None:
@@ -104,11 +123,24 @@ def by_pillow(path: Path | BinaryIO) -> Pixels | NDArray[np.uint8] | NDArray[np.
         return np.array(image.convert(through).convert("RGB"))
 
 
-def alpha_of(path: Path | BinaryIO) -> Pixels:
-    """The opacity ``(h, w)`` of an image that Pillow reads, 0 to 1 with 8 bits of precision; 1 if it has none."""
+def alpha_of(file: Path | BinaryIO) -> Pixels:
+    """The opacity ``(h, w)`` of an image, or of its content, 0 to 1; 1 if it has none.
+
+    Raises:
+        ValueError, OSError or other exceptions of the decoders: the file cannot be read.
+    """
+    if not isinstance(file, Path):
+        return _of_content(file, alpha_of) if _is_png(file) else _alpha_by_pillow(file)
+    if file.suffix.lower() in _RADIANCE:
+        return np.ones(decoded(file).shape[:2], np.float32)
+    found = _wide_alpha(file) if file.suffix.lower() in _WIDE else None
+    return _alpha_by_pillow(file) if found is None else found
+
+
+def _alpha_by_pillow(file: Path | BinaryIO) -> Pixels:
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", Image.DecompressionBombWarning)  # large images are rejected here
-        image = Image.open(path)
+        image = Image.open(file)
     with image:
         _require_size(*image.size)
         if "A" not in image.getbands() and "transparency" not in image.info:
@@ -155,6 +187,25 @@ def _wide(path: Path) -> Pixels | NDArray[np.uint16] | None:
     pixels = oiio.ImageBufAlgo.reorient(image).get_pixels(oiio.FLOAT if linear else oiio.UINT16)
     assert pixels is not None
     return _three(pixels)
+
+
+def _wide_alpha(path: Path) -> Pixels | None:
+    """The opacity of an image of more than 8 bits; None for 8-bit files."""
+    import OpenImageIO as oiio
+
+    image = _opened(path)
+    spec = image.spec()
+    if spec.format.basetype in (oiio.UINT8, oiio.INT8):
+        return None
+    _require_size(spec.width, spec.height)
+    if spec.alpha_channel < 0:
+        return np.ones((spec.height, spec.width), np.float32)
+    pixels = oiio.ImageBufAlgo.reorient(image).get_pixels(oiio.FLOAT)  # integers as fractions
+    _require_read(image)
+    alpha = pixels[..., spec.alpha_channel]
+    if not np.isfinite(alpha).all():
+        raise ValueError("expected finite opacities")
+    return np.clip(alpha, 0.0, 1.0)
 
 
 def _require_read(image: ImageBuf) -> None:

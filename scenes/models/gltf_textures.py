@@ -24,7 +24,7 @@ from scenes.loading import decode_srgb, fractions, one_line
 from scenes.models.gltf_data import GltfData
 from scenes.models.json_records import misplaced
 from scenes.models.sources import Sources
-from scenes.pictures import Pixels, alpha_of, by_pillow, decoded, resized
+from scenes.pictures import Pixels, alpha_of, decoded, resized
 
 Values = TypeVar("Values")
 Uvs = Float[NDArray[np.float64], "*n 2"]
@@ -147,7 +147,7 @@ class GltfTextures(Textures):
         source = self._source(lookup)
         key = (source, numbers)
         if key not in self._pictures:
-            found = self._decoded(source, lambda file: decoded(file) if isinstance(file, Path) else by_pillow(file))
+            found = self._decoded(source, decoded)
             linear = numbers or found.dtype == np.float32
             self._pictures[key] = fractions(found) if linear else decode_srgb(found)  # type: ignore[arg-type]
         return self._pictures[key]

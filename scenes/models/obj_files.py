@@ -48,6 +48,7 @@ class _File:
     groups: dict[str, _Group] = field(default_factory=dict)
     libraries: list[str] = field(default_factory=list)
     unread: set[str] = field(default_factory=set)
+    few: int = 0  # faces of fewer than three corners
 
 
 def read_obj(sources: Sources, report: LossReport, facets: bool = False) -> tuple[Instance, ...]:
@@ -63,6 +64,8 @@ def read_obj(sources: Sources, report: LossReport, facets: bool = False) -> tupl
     file = _parsed(text_of(sources.path))
     for keyword in sorted(file.unread):
         report.add(stem, f"lines of the kind {keyword!r}")
+    if file.few:
+        report.add(stem, f"{file.few} faces of fewer than three corners")
     materials = _materials(file.libraries, sources, report, facets)
     points = _table(file.points, (3, 4, 6, 7, 8), "v")
     uvs, normals = _table(file.uvs, (1, 2, 3), "vt"), _table(file.normals, (3,), "vn")
@@ -95,7 +98,8 @@ def _parsed(text: str) -> _File:
         elif keyword in ("f", "fo"):
             corners = rest.split()
             if len(corners) < 3:
-                raise SceneError(f"cannot be read: line {number}: expected a face of three corners, got {line!r:.40}")
+                file.few += 1
+                continue
             if group is None:
                 group = file.groups.setdefault(name, _Group())
             if "-" in rest:

@@ -25,7 +25,7 @@ def read_plain(sources: Sources, report: LossReport, facets: bool = False) -> tu
     if path.suffix.lower() == ".stl":
         mesh = _stl(path.read_bytes(), str(path))
         return () if mesh is None else (Instance(mesh, GREY, name=name),)
-    mesh, colors = read_coloured_ply(path.read_bytes(), str(path))
+    mesh, colors = read_coloured_ply(path.read_bytes(), str(path), report)
     if colors is None:
         return (Instance(mesh, GREY, name=name),)
     texture, uvs = coloured(decode_srgb(colors)[mesh.faces], str(path))

@@ -85,6 +85,9 @@ def triangles_of(mesh: Any, code: Any, where: str, report: LossReport) -> Triang
     if surface is not None:
         points, counts, indices = weighted(surface.smooth, points), surface.cage.counts, surface.cage.indices
         of_polygon = surface.polygon
+    few = int(((counts < 3) & ~hole[of_polygon]).sum())
+    if few:
+        report.add(where, f"{few} faces of fewer than three corners")
     drawn = (counts >= 3) & ~hole[of_polygon]
     if not drawn.any():
         return None

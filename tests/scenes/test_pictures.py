@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import struct
 import zlib
 from pathlib import Path
@@ -11,8 +12,10 @@ import OpenEXR
 import pytest
 from PIL import Image
 
+from scenes import pictures
 from scenes.canonical import SceneError
-from scenes.loading import is_linear, read_image
+from scenes.loading import is_linear, read_alpha, read_image
+from scenes.pictures import alpha_of
 from tests.scenes.formats.files import CASES
 
 FOLDER = CASES / "picture-files"
@@ -174,3 +177,41 @@ def test_16_bits_with_colour_or_alpha(channels: int, tmp_path: Path) -> None:
     path.write_bytes(b"\x89PNG\r\n\x1a\n" + b"".join(parts))
     # 8 bits would give that of 127 / 255
     assert read_image(path) == pytest.approx(np.full((2, 3, 3), decoded(32700 / 65535)), rel=1e-5)
+
+
+def png_of_16_bits(values: np.ndarray, color_type: int, transparent: bytes) -> bytes:
+    def chunk(name: bytes, body: bytes) -> bytes:
+        return struct.pack(">I", len(body)) + name + body + struct.pack(">I", zlib.crc32(name + body))
+
+    header = struct.pack(">IIBBBBB", values.shape[1], values.shape[0], 16, color_type, 0, 0, 0)
+    rows = zlib.compress(b"".join(b"\0" + row.astype(">u2").tobytes() for row in values))
+    parts = (b"IHDR", header), (b"tRNS", transparent), (b"IDAT", rows), (b"IEND", b"")
+    return b"\x89PNG\r\n\x1a\n" + b"".join(chunk(*part) for part in parts)
+
+
+@pytest.mark.parametrize("grey", [False, True])
+def test_the_transparent_colour_of_16_bits_is_compared_in_all_bits(grey: bool, tmp_path: Path) -> None:
+    """A colour that differs in the last bit is opaque; the file and its content, as glTF embeds it, are the same."""
+    values = np.array([[300, 301], [65535, 0]] if grey else [[[300, 2, 3], [301, 2, 3]], [[65535, 0, 0], [0, 0, 0]]])
+    content = png_of_16_bits(values, 0 if grey else 2, struct.pack(">H" if grey else ">HHH", *np.ravel(values[0, 0])))
+    path = tmp_path / "a.png"
+    path.write_bytes(content)
+    assert read_alpha(path).tolist() == alpha_of(io.BytesIO(content)).tolist() == [[0.0, 1.0], [1.0, 1.0]]
+    expected = np.repeat(values[..., None], 3, axis=-1) if grey else values
+    assert np.array_equal(pictures.decoded(path), expected)
+    assert np.array_equal(pictures.decoded(io.BytesIO(content)), expected)
+
+
+def test_alpha_of_openexr_and_radiance(tmp_path: Path) -> None:
+    given = np.array([[0.0, 0.25], [1.0, 7.0]], np.float32)
+    channels = {"R": given, "G": given, "B": given, "A": given}
+    header = {"compression": OpenEXR.ZIP_COMPRESSION, "type": OpenEXR.scanlineimage}
+    OpenEXR.File(header, channels).write(str(tmp_path / "a.exr"))
+    assert read_alpha(tmp_path / "a.exr").tolist() == [[0.0, 0.25], [1.0, 1.0]]
+    OpenEXR.File(header, {"Y": given}).write(str(tmp_path / "none.exr"))
+    assert read_alpha(tmp_path / "none.exr").tolist() == [[1.0, 1.0], [1.0, 1.0]]
+    OpenEXR.File(header, channels | {"A": given * np.float32("nan")}).write(str(tmp_path / "broken.exr"))
+    with pytest.raises(SceneError, match="broken.exr: cannot be read: expected finite opacities"):
+        read_alpha(tmp_path / "broken.exr")
+    (tmp_path / "a.hdr").write_bytes(radiance(bytes([128, 64, 32, 129] * 2), 2, 1))
+    assert read_alpha(tmp_path / "a.hdr").tolist() == [[1.0, 1.0]]

@@ -15,9 +15,10 @@ from scenes.canonical import Disk, Mesh, SceneError, Shape, Sphere
 from scenes.canonical.values import Matrix
 from scenes.formats.directives.syntax import Parameters
 from scenes.formats.geometry import revolution
+from scenes.formats.geometry.checked import checked_mesh
 from scenes.formats.geometry.meshed import as_mesh
 from scenes.formats.geometry.orientation import facing_normals, turned
-from scenes.formats.geometry.ply_files import checked_mesh, read_ply
+from scenes.formats.geometry.ply_files import read_ply
 from scenes.formats.geometry.subdivision import LEVELS, loop_surface
 from scenes.formats.losses import LossReport
 from scenes.formats.text.scene_files import SceneFiles
@@ -132,7 +133,7 @@ class ShapeReader:
             return None
         key = path, turn_over
         if key not in self._meshes:
-            mesh = read_ply(self.files.read(path, where), str(path))
+            mesh = read_ply(self.files.read(path, where), str(path), self.report)
             self._meshes[key] = facing_normals(turned(mesh) if turn_over else mesh)
         return self._meshes[key]
 

@@ -14,7 +14,7 @@ from collections.abc import Container, Iterator
 import numpy as np
 
 from scenes.canonical import Mesh, SceneError
-from scenes.formats.geometry.ply_files import checked_mesh
+from scenes.formats.geometry.checked import checked_mesh
 from scenes.loading import one_line
 
 _MAGIC = 0x041C

@@ -110,3 +110,22 @@ def _cut(places: Float[NDArray[np.float64], "n c 3"]) -> list[Int[NDArray[np.int
     plane = np.ascontiguousarray(plane - plane[:, :1])
     ends = np.array([plane.shape[1]], np.uint32)
     return [mapbox_earcut.triangulate_float64(one, ends).astype(np.int64).reshape(-1, 3) for one in plane]
+
+
+def triangles_of_strips(at: NDArray, counts: Int[NDArray[np.int64], " strips"]) -> NDArray:
+    """The triangles ``(f, 3)`` of strips, each of three successive corners; every second one is turned over, so that
+    all have the same side. Those without area are left out.
+
+    Args:
+        at: index of the point at each corner of all strips, one after the other; a negative one begins a strip anew.
+        counts: number of corners of each strip, with the negative ones.
+    """
+    ends = np.cumsum(counts)
+    at = np.insert(at, ends[:-1], -1) if len(ends) > 1 else at
+    number = np.arange(len(at))
+    start = np.maximum.accumulate(np.where(at < 0, number + 1, 0))
+    found = np.stack([at[:-2], at[1:-1], at[2:]], axis=1)
+    odd = (number - start)[:-2] % 2 == 1
+    found[odd] = found[odd][:, [1, 0, 2]]
+    a, b, c = found.T
+    return found[(found >= 0).all(axis=1) & (a != b) & (b != c) & (c != a)]

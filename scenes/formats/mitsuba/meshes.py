@@ -72,7 +72,7 @@ class MitsubaMeshes:
             if kind == "serialized":
                 mesh = read_serialized(content, index, str(path), modern)
             else:
-                mesh = read_obj(content, str(path)) if kind == "obj" else read_ply(content, str(path))
+                mesh = read_obj(content, str(path)) if kind == "obj" else read_ply(content, str(path), self.report)
             uvs = mesh.uvs
             if uvs is not None and flipped:
                 uvs = np.stack([uvs[:, 0], 1.0 - uvs[:, 1]], axis=1).astype(np.float32)

@@ -237,7 +237,7 @@ def test_a_mirrored_textured_sphere_is_a_mesh_with_its_outside_out_for_luxrender
     scene = Scene(PerspectiveCamera(), (Instance(Sphere(), Matte(CHECKS), FLIPPED),))
     save_scene_file(scene, tmp_path / "a.lxs")
     (file,) = (tmp_path / "models").iterdir()
-    mesh = read_ply(file.read_bytes(), "sphere")
+    mesh = read_ply(file.read_bytes(), "sphere", LossReport())
     corners = mesh.vertices[mesh.faces]
     outward = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     assert ((outward * corners.mean(axis=1)).sum(axis=1) > 0.0).all()

@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
+import OpenEXR
 import pytest
 from PIL import Image
 
@@ -161,6 +162,16 @@ def test_faults_are_named_in_one_line(text: str, message: str, tmp_path: Path) -
         read_model(path)
 
 
+def test_faces_of_fewer_than_three_corners_are_a_loss(tmp_path: Path) -> None:
+    path, report = tmp_path / "in.obj", LossReport()
+    path.write_text(SQUARE + "f 1 2\nf\nf -1\n" + FACE)
+    (part,) = read_model(path, report)
+    assert len(part.shape.faces) and "in: 3 faces of fewer than three corners: left out" in report.text()
+    path.write_text(SQUARE + "f 1 2\n")
+    with pytest.raises(SceneError, match="expected at least one face"):
+        read_model(path)
+
+
 def area(part: Instance) -> float:
     corners = part.shape.vertices[part.shape.faces]
     return 0.5 * np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1).sum()
@@ -202,7 +213,10 @@ def test_opacity_and_normal_maps_along_paths(tmp_path: Path) -> None:
     Image.new("L", (2, 2), 102).save(tmp_path / "grey.png")
     Image.new("RGB", (2, 2), (255, 128, 128)).save(tmp_path / "bent.png")
     Image.new("RGB", (2, 2), (255, 128, 128)).save(tmp_path / "kd.png")
-    for line, opacity in (("d 0.5", 0.5), ("map_d alpha.png", 0.2), ("map_d grey.png", 0.4),
+    half = np.full((2, 2), 0.25, np.float32)
+    header = {"compression": OpenEXR.ZIP_COMPRESSION, "type": OpenEXR.scanlineimage}
+    OpenEXR.File(header, dict.fromkeys("RGBA", half)).write(str(tmp_path / "alpha.exr"))
+    for line, opacity in (("d 0.5", 0.5), ("map_d alpha.exr", 0.25), ("map_d alpha.png", 0.2), ("map_d grey.png", 0.4),
                           ("map_d -imfchan l alpha.png", 1.0), ("map_d -imfchan m grey.png", 1.0),
                           ("map_d -imfchan g bent.png", 128 / 255), ("d 0.5\nmap_d grey.png", 0.2)):  # fmt: skip
         report = LossReport()

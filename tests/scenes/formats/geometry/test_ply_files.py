@@ -11,6 +11,7 @@ import trimesh
 from scenes.canonical import Mesh, SceneError
 from scenes.formats.geometry.ply_files import read_ply
 from scenes.formats.geometry.ply_writing import ply_bytes
+from scenes.formats.losses import LossReport
 
 ASCII = b"""ply
 format ascii 1.0
@@ -33,7 +34,7 @@ end_header
 
 
 def test_convex_polygons_are_fans() -> None:
-    mesh = read_ply(ASCII, "a.ply")
+    mesh = read_ply(ASCII, "a.ply", LossReport())
     np.testing.assert_array_equal(mesh.faces, [[0, 1, 2], [0, 2, 3], [0, 1, 4]])
     assert mesh.normals is None and mesh.uvs is None
 
@@ -45,7 +46,7 @@ def test_binary_with_faces_of_several_sizes(order: str, sign: str) -> None:
     faces = (
         b"\x04" + np.array([0, 1, 2, 3], sign + "i4").tobytes() + b"\x03" + np.array([0, 1, 4], sign + "i4").tobytes()
     )
-    found, wanted = read_ply(header + points + faces, "a.ply"), read_ply(ASCII, "a.ply")
+    found, wanted = read_ply(header + points + faces, "a.ply", LossReport()), read_ply(ASCII, "a.ply", LossReport())
     np.testing.assert_array_equal(found.faces, wanted.faces)
     np.testing.assert_array_equal(found.vertices, wanted.vertices)
 
@@ -58,7 +59,7 @@ def test_what_is_written_is_read_again_here_and_by_the_mesh_library(parts: tuple
     uvs = rng.random((9, 2)).astype(np.float32)
     faces = rng.permuted(np.tile(np.arange(9), (7, 1)), axis=1)[:, :3].astype(np.int32)
     mesh = Mesh(rng.random((9, 3)).astype(np.float32), faces, normals if parts[0] else None, uvs if parts[1] else None)
-    found = read_ply(ply_bytes(mesh), "a.ply")
+    found = read_ply(ply_bytes(mesh), "a.ply", LossReport())
     np.testing.assert_array_equal(found.vertices, mesh.vertices)
     np.testing.assert_array_equal(found.faces, mesh.faces)
     for a, b in ((found.normals, mesh.normals), (found.uvs, mesh.uvs)):
@@ -75,7 +76,9 @@ def test_what_is_written_is_read_again_here_and_by_the_mesh_library(parts: tuple
         (b"vertex 5", b"vertex 4000000000", "expected 4000000000 of 'vertex' as its header says, got fewer"),
         (b"face 2", b"face 3", "expected 3 of 'face'"),
         (b"4 0 1 2 3", b"4 0 1 2 7", "expected indices below 5, got 7"),
-        (b"4 0 1 2 3", b"2 0 1\n3 0 1 2", "expected faces of 3 to 64 corners, got 2"),
+        (b"4 0 1 2 3", b"2.5 0 1\n3 0 1 2", "expected a number of corners, got 2.5"),
+        (b"4 0 1 2 3", b"-1 0 1\n3 0 1 2", "expected a number of corners, got -1"),
+        (b"vertex_indices", b"corners", "expected a list of vertex indices in 'face'"),
         (b"0 0 1\n4", b"0 0 nan\n4", "expected finite vertices"),
         (b"0 0 1\n4", b"0 0 1e308\n4", "expected finite vertices"),
         (b"0 0 1\n4", b"0 0 x\n4", "expected numbers behind the PLY header"),
@@ -88,7 +91,7 @@ def test_what_is_written_is_read_again_here_and_by_the_mesh_library(parts: tuple
 def test_files_that_are_not_what_they_say(old: bytes, new: bytes, message: str) -> None:
     assert old in ASCII
     with pytest.raises(SceneError, match=message):
-        read_ply(ASCII.replace(old, new, 1), "a.ply")
+        read_ply(ASCII.replace(old, new, 1), "a.ply", LossReport())
 
 
 def test_binary_headers_that_lie() -> None:
@@ -96,10 +99,10 @@ def test_binary_headers_that_lie() -> None:
     content = ply_bytes(mesh)
     for old, new in ((b"vertex 3", b"vertex 99999999999"), (b"face 1", b"face 99999999999"), (b"face 1", b"face 2")):
         with pytest.raises(SceneError, match="as its header says, got fewer"):
-            read_ply(content.replace(old, new, 1), "a.ply")
+            read_ply(content.replace(old, new, 1), "a.ply", LossReport())
     for cut in range(len(content)):
         with pytest.raises(SceneError):
-            read_ply(content[:cut], "a.ply")
+            read_ply(content[:cut], "a.ply", LossReport())
 
 
 @pytest.mark.parametrize("order", ["ascii", "binary_little_endian", "binary_big_endian"])
@@ -116,9 +119,55 @@ def test_concave_polygons_are_covered_once(order: str) -> None:
         sign = "<" if "little" in order else ">"
         body = b"".join(struct.pack(f"{sign}dhB", x, y, 0) for x, y in points)
         body += b"".join(struct.pack(f"{sign}B{len(face)}H", len(face), *face) for face in faces)
-    mesh = read_ply(head.encode() + body, "a.ply")
+    mesh = read_ply(head.encode() + body, "a.ply", LossReport())
     corners = mesh.vertices[mesh.faces][..., :2].astype(np.float64)
     edges = corners[:, 1:] - corners[:, :1]
     areas = 0.5 * (edges[:, 0, 0] * edges[:, 1, 1] - edges[:, 0, 1] * edges[:, 1, 0])
     assert len(areas) == 5 and (areas > 0.0).all() and areas[:4].sum() == pytest.approx(3.0)
     np.testing.assert_array_equal(mesh.faces[4], [0, 1, 2])
+
+
+@pytest.mark.parametrize("order", ["<", ">", ""])
+def test_strips_of_triangles(order: str) -> None:
+    """As in the models of Stanford: a negative index begins a strip anew, and every second triangle is turned over."""
+    strips = [[0, 1, 2, 3, -1, 4, 5, 5, 6, 4, -1, 0, 1], [1, 2, 6]]
+    form = {"<": "binary_little_endian", ">": "binary_big_endian", "": "ascii"}[order]
+    head = f"ply\nformat {form} 1.0\nelement vertex 7\nproperty float x\nproperty float y\nproperty float z\n"
+    head += f"element tristrips {len(strips)}\nproperty list int int vertex_indices\nend_header\n"
+    points = np.random.default_rng(0).random((7, 3)).astype(np.float32)
+    if order:
+        rows = [np.array([len(strip), *strip], order + "i4").tobytes() for strip in strips]
+        body = points.astype(order + "f4").tobytes() + b"".join(rows)
+    else:
+        lines = [*(" ".join(map(repr, row)) for row in points.astype(float).tolist())]
+        body = "\n".join([*lines, *(" ".join(map(str, [len(one), *one])) for one in strips)]).encode()
+    report = LossReport()
+    mesh = read_ply(head.encode() + body, "a.ply", report)
+    np.testing.assert_array_equal(mesh.faces, [[0, 1, 2], [2, 1, 3], [5, 6, 4], [1, 2, 6]])
+    np.testing.assert_array_equal(mesh.vertices, points)
+    assert not report.losses
+
+
+def test_faces_of_few_corners_and_other_lists_are_losses() -> None:
+    content = ASCII.replace(b"face 2", b"face 5").replace(b"4 0 1 2 3", b"0\n2 0 1\n4 0 1 2 3\n1 2")
+    content = content.replace(
+        b"end_header", b"element range_grid 2\nproperty list uchar int vertex_indices\nend_header"
+    )
+    report = LossReport()
+    mesh = read_ply(content + b"1 0\n0\n", "a.ply", report)
+    np.testing.assert_array_equal(mesh.faces, [[0, 1, 2], [0, 2, 3], [0, 1, 4]])
+    assert [loss.what for loss in report.losses] == [
+        "2 elements of the kind 'range_grid'", "3 faces of fewer than three corners",
+    ]  # fmt: skip
+
+
+def test_a_polygon_of_many_corners() -> None:
+    angle = 2.0 * np.pi * np.arange(100) / 100
+    ring = "".join(f"{np.cos(a)} {np.sin(a)} 0\n" for a in angle)
+    head = ASCII[: ASCII.index(b"end_header")].replace(b"vertex 5", b"vertex 100").replace(b"face 2", b"face 1")
+    mesh = read_ply(
+        head + b"end_header\n" + ring.encode() + b"100 " + " ".join(map(str, range(100))).encode(),
+        "a.ply",
+        LossReport(),
+    )
+    assert len(mesh.faces) == 98
