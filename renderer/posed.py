@@ -126,8 +126,9 @@ class PosedRenderer:
         if not isinstance(batch.time_s, Tensor):
             return self._traced(batch, aspect, self.poses.number(batch.time_s))
         numbers = self.poses.numbers(batch.time_s)
-        color, counters = torch.empty(*batch.position.shape[:2], 3), Counter[str]()
-        hits = empty_hits(*batch.position.shape[:2], color.device) if batch.hits else None
+        groups, group_size, _ = batch.position.shape
+        color, counters = torch.empty(groups, group_size, 3), Counter[str]()
+        hits = empty_hits(groups, group_size, color.device) if batch.hits else None
         for number in numbers.unique().tolist():
             own = numbers == number
             rows = own.any(dim=1)

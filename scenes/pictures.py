@@ -202,6 +202,7 @@ def _wide_alpha(path: Path) -> Pixels | None:
         return np.ones((spec.height, spec.width), np.float32)
     pixels = oiio.ImageBufAlgo.reorient(image).get_pixels(oiio.FLOAT)  # integers as fractions
     _require_read(image)
+    assert pixels is not None
     alpha = pixels[..., spec.alpha_channel]
     if not np.isfinite(alpha).all():
         raise ValueError("expected finite opacities")

@@ -113,13 +113,14 @@ def parse(options: type[Options], description: str, arguments: list[str] | None 
     import tyro
 
     from analysis.command.messages import as_typed, one_line
-    from analysis.command.subjects import by_subject, renamed, unknown
+    from analysis.command.subjects import SET, by_subject, renamed, unknown
 
     caught, given = io.StringIO(), sys.argv[1:] if arguments is None else arguments
-    shown = by_subject(options) if {"-h", "--help"}.intersection(given) else options
+    asked = bool({"-h", "--help"}.intersection(given))
+    shown = by_subject(options) if asked else options
     try:
         with contextlib.redirect_stderr(caught), bad_input():
-            return tyro.cli(shown, description=_as_called(description), args=given)
+            return tyro.cli(shown, description=_as_called(description), args=given, registry=SET if asked else None)
     except InputError as error:
         raise InputError(as_typed(str(error), given)) from error.__cause__
     except SystemExit as stop:

@@ -11,7 +11,7 @@ import re
 import textwrap
 import types
 from collections.abc import Iterator, Sequence
-from typing import Annotated, Any, Union, get_args, get_origin, get_type_hints
+from typing import Annotated, Any, Literal, Union, get_args, get_origin, get_type_hints
 
 import tyro
 
@@ -60,6 +60,27 @@ _SUBJECT_OF = {name: subject for subject, names in SUBJECTS.items() for name in 
 _REST = "further"
 
 
+SET = tyro.constructors.ConstructorRegistry()
+"""Types as the help shows them: without ``{None}``, which is the value of an option that is not given."""
+
+
+@SET.primitive_rule
+def _without_none(info: tyro.constructors.PrimitiveTypeInfo) -> Any:
+    """The specification of a type that may be None: that of the type without it."""
+    kinds = get_args(info.type) if get_origin(info.type) in (Union, types.UnionType) else ()
+    if type(None) not in kinds:
+        return None
+    kind = Union[tuple(one for one in kinds if one is not type(None))]  # noqa: UP007
+    spec = tyro.constructors.ConstructorRegistry.get_primitive_spec(info.make(kind, info.markers))
+    if not isinstance(spec, tyro.constructors.PrimitiveConstructorSpec):
+        return spec
+    return dataclasses.replace(
+        spec,
+        is_instance=lambda value: value is None or spec.is_instance(value),
+        str_from_instance=lambda value: [] if value is None else spec.str_from_instance(value),
+    )
+
+
 @dataclasses.dataclass(frozen=True)
 class _Option:
     """An option: a field of a record, its type with all marks, and its documentation."""
@@ -93,15 +114,40 @@ class _Option:
 
     @property
     def member(self) -> tuple[str, Any, Any]:
-        """The same as a field of a new record."""
-        told = any(getattr(mark, "help", None) for mark in self.marks)
-        kind = self.kind if told or not self.doc else Annotated[self.kind, tyro.conf.arg(help=self.doc)]
+        """The same as a field of a new record, whose help is that of :func:`by_subject`."""
         copied = dataclasses.field(default=self.field.default, default_factory=self.field.default_factory)  # type: ignore[call-overload]
-        return self.field.name, kind, copied
+        if self.record:
+            return self._member_record(copied)
+        told = next((mark for mark in self.marks if getattr(mark, "help", None)), None)
+        kind = get_args(self.kind)[0] if self.marks else self.kind
+        unset = self.field.default in (None, "", ())
+        choices = [str(choice) for choice in get_args(kind) if choice] if get_origin(kind) is Literal else []
+        words = {"metavar": f"{{{','.join(choices)}}}"} if choices and unset else {}
+        shown = tyro.conf.arg(
+            **words
+            | {part: getattr(told, part) for part in ("name", "metavar", "constructor") if getattr(told, part, None)},
+            help=told.help if told else self.doc or None,
+            help_behavior_hint="" if unset else None,
+        )
+        marks = (mark for mark in self.marks if mark is not told)
+        return self.field.name, Annotated[(kind, shown, *marks)], copied
+
+    def _member_record(self, copied: Any) -> tuple[str, Any, Any]:
+        made = _restated(self.record, [one.member for one in _options(self.record, merged=False)])
+        values = [one.name for one in dataclasses.fields(made)]
+
+        def default() -> Any:
+            given = copied.default_factory() if copied.default is dataclasses.MISSING else copied.default
+            return made(**{name: getattr(given, name) for name in values})
+
+        kind = Annotated[(made, *self.marks)] if self.marks else made
+        return self.field.name, kind, dataclasses.field(default_factory=default)
 
 
 def by_subject(options: Any) -> Any:
     """The same options in nested records by subject, if they are more than ten; for the help only.
+
+    The help does not speak of values that stand for none: an option that is not given has no default there.
 
     Args:
         options: a record of options, or a union of such records, which are commands.
@@ -115,15 +161,19 @@ def by_subject(options: Any) -> Any:
     found = list(_options(options, merged=False))
     boxes = {box: [one.member for one in found if one.subject == box] for box in (*SUBJECTS, _REST)}
     if sum(map(len, boxes.values())) < MOST:  # the help itself is one more
-        return options
+        return _restated(options, [one.member for one in found])
     members = [one.member for one in found if one.subject is None and not one.record]
     for subject, inside in boxes.items():
         if inside:
             record = dataclasses.make_dataclass(subject, inside, namespace={"__doc__": ""})
             members.append((subject, tyro.conf.OmitArgPrefixes[record], dataclasses.field(default_factory=record)))
     members += [one.member for one in found if one.record]
-    named = {"__doc__": options.__doc__}
-    return dataclasses.make_dataclass(options.__name__, members, kw_only=True, namespace=named)
+    return _restated(options, members)
+
+
+def _restated(record: Any, members: Sequence[tuple[str, Any, Any]]) -> Any:
+    """A record of other fields, with the name and the documentation of the given one."""
+    return dataclasses.make_dataclass(record.__name__, members, kw_only=True, namespace={"__doc__": record.__doc__})
 
 
 def described(options: Any) -> dict[str, str]:

@@ -63,7 +63,7 @@ class RunOptions(ViewOptions):
     ledger: Ledger = "thesis"
     """How cost is counted; wall takes measured time in place of simulated time."""
     capacity: float | None = None
-    """Speed of the simulated machine, FLOP/s. None means 8.7e10 at 512², in proportion to the pixels at other sizes: 8
+    """Speed of the simulated machine, FLOP/s; by default 8.7e10 at 512², in proportion to the pixels at other sizes: 8
     framed images a second."""
     trace_segments: float = SEGMENTS_DEFAULT
     """Ray segments per sample; the thesis' inputs have about 4, its table says 5."""
@@ -72,7 +72,7 @@ class RunOptions(ViewOptions):
     rivals: tuple[str, ...] = DEFAULT_RIVALS
     """Rivals at equal cost; ratios are to the first. The default leaves out the policy itself."""
     metrics: tuple[str, ...] | None = None
-    """Further metrics beside the squared errors, such as flip, ssim or jod. None takes flip, and jod where the
+    """Further metrics beside the squared errors, such as flip, ssim or jod; by default flip, and jod where the
     reference's rate is a whole fraction of the display's; without names, no further one is taken."""
     jod_s: float = 0.25
     """Length of the part in the middle of a run that metrics of sequences score, seconds; such as jod, for which an

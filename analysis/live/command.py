@@ -8,18 +8,16 @@ Examples: python scripts/live.py fly-by
 
 from __future__ import annotations
 
-from analysis.command.cli import bad_input, parse
+from analysis.command.cli import parse
 from analysis.command.start import first_imports
 from analysis.live.options import LiveOptions
+from analysis.study.view_options import require_scene
 
 
 def main() -> None:
     """Parses; shows the page until Ctrl-C, or measures cycle rates and prints them."""
     options = parse(LiveOptions, __doc__ or "")
-    with first_imports(), bad_input():
-        from scenes import catalog
-
-        catalog.require_known(options.input)  # before anything that takes long to load
+    require_scene(options.input)  # before anything that takes long to load
     with first_imports():
         from analysis.command.console import show
         from analysis.live.bench import cycle_rates

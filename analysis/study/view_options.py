@@ -15,6 +15,21 @@ if TYPE_CHECKING:
     from scenes.catalog import Look
 
 
+def require_scene(scene: str) -> None:
+    """Checks that a scene is known, before libraries load.
+
+    Args:
+        scene: name or number of a scene, or a file.
+
+    Raises:
+        InputError: it is not.
+    """
+    with first_imports(), bad_input():
+        from scenes import catalog
+
+        catalog.require_known(scene)
+
+
 @dataclass(frozen=True, kw_only=True)
 @closed_choices()
 class ViewOptions:
@@ -68,10 +83,7 @@ class ViewOptions:
             InputError: one of them is not.
         """
         require_files(*(file for file in (self.environment, self.camera_keys) if file is not None))
-        with first_imports(), bad_input():
-            from scenes import catalog
-
-            catalog.require_known(scene)
+        require_scene(scene)
 
     @property
     def look(self) -> Look:

@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Sequence
-from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -15,6 +14,7 @@ from numpy.typing import NDArray
 
 from scenes.arithmetic import cos, product, sin
 from scenes.canonical import Curves, Instance, Mesh
+from scenes.formats.geometry.keeping import kept_with_shape
 
 SIDES = 12
 """Sides of the prism that stands for a tube; its sides lie within 3.5 % of the radius."""
@@ -136,7 +136,7 @@ def _whole(shapes: Sequence[object]) -> Curves:
     return dataclasses.replace(parts[0], points=points, widths=widths, counts=counts, normals=whole)
 
 
-@lru_cache(maxsize=64)
+@kept_with_shape
 def curve_mesh(curves: Curves) -> Mesh:
     """Curves as triangles: tubes as prisms of :data:`SIDES` sides, ribbons as strips; chords are within
     :data:`STRAIGHT` of the curves, or fewer for more than :data:`TRIANGLES_MOST`. Ribbons that face the viewer are

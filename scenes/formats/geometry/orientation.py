@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from functools import lru_cache
-
 import numpy as np
 
 from scenes.arithmetic import determinant, product
 from scenes.canonical import Cube, Mesh, Shape, Sphere
+from scenes.formats.geometry.keeping import kept_with_shape
 
 FLIPPED = np.diag([1.0, 1.0, -1.0, 1.0])
 """Reflection in z, which leaves a sphere unchanged and reverses its texture coordinate ``v``."""
@@ -18,14 +17,14 @@ def area_normals(corners: np.ndarray) -> np.ndarray:
     return np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
 
 
-@lru_cache(maxsize=8)
+@kept_with_shape
 def turned(mesh: Mesh) -> Mesh:
     """The mesh with its inside out; the same one for a mesh that many shapes share."""
     normals = None if mesh.normals is None else -mesh.normals
     return Mesh(mesh.vertices, mesh.faces[:, ::-1].copy(), normals, mesh.uvs, mesh.source)
 
 
-@lru_cache(maxsize=64)
+@kept_with_shape
 def is_closed(shape: Shape) -> bool:
     """Whether a shape is closed, so that the backs of its faces are not visible from outside."""
     if not isinstance(shape, Mesh):
@@ -70,7 +69,7 @@ def upright(mesh: Mesh, matrix: np.ndarray) -> tuple[Mesh, np.ndarray]:
     return (mesh, matrix) if determinant(matrix) > 0.0 else (_reflected(mesh), product(matrix, FLIPPED))
 
 
-@lru_cache(maxsize=8)
+@kept_with_shape
 def _reflected(mesh: Mesh) -> Mesh:
     away = np.array([1.0, 1.0, -1.0], np.float32)
     normals = None if mesh.normals is None else mesh.normals * away
