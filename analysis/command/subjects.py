@@ -70,7 +70,7 @@ def _without_none(info: tyro.constructors.PrimitiveTypeInfo) -> Any:
     kinds = get_args(info.type) if get_origin(info.type) in (Union, types.UnionType) else ()
     if type(None) not in kinds:
         return None
-    kind = Union[tuple(one for one in kinds if one is not type(None))]  # noqa: UP007
+    kind: Any = Union[tuple(one for one in kinds if one is not type(None))]  # noqa: UP007
     spec = tyro.constructors.ConstructorRegistry.get_primitive_spec(info.make(kind, info.markers))
     if not isinstance(spec, tyro.constructors.PrimitiveConstructorSpec):
         return spec
@@ -122,13 +122,10 @@ class _Option:
         kind = get_args(self.kind)[0] if self.marks else self.kind
         unset = self.field.default in (None, "", ())
         choices = [str(choice) for choice in get_args(kind) if choice] if get_origin(kind) is Literal else []
-        words = {"metavar": f"{{{','.join(choices)}}}"} if choices and unset else {}
-        shown = tyro.conf.arg(
-            **words
-            | {part: getattr(told, part) for part in ("name", "metavar", "constructor") if getattr(told, part, None)},
-            help=told.help if told else self.doc or None,
-            help_behavior_hint="" if unset else None,
-        )
+        words: dict[str, Any] = {"metavar": f"{{{','.join(choices)}}}"} if choices and unset else {}
+        words |= {part: getattr(told, part) for part in ("name", "metavar", "constructor") if getattr(told, part, None)}
+        hint = "" if unset else None
+        shown = tyro.conf.arg(**words, help=told.help if told else self.doc or None, help_behavior_hint=hint)
         marks = (mark for mark in self.marks if mark is not told)
         return self.field.name, Annotated[(kind, shown, *marks)], copied
 
