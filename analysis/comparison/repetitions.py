@@ -43,7 +43,7 @@ class InputsOptions:
     ledger: Ledger = "thesis"
     """How cost is counted; wall takes measured time in place of simulated time."""
     capacity: float | None = None
-    """Speed of the simulated machine, FLOP/s. None gives 8 framed images a second at every size."""
+    """Speed of the simulated machine, FLOP/s. By default 8 framed images a second at every size."""
     reference_rate_hz: float = 30.0
     """Reference images per simulated second; half as many as run.py has, because references take most of the time."""
     out: Path = Path("out/inputs")

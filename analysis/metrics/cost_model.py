@@ -79,7 +79,7 @@ class CostParameters:
     tree_size: Value = 1024
     """Nodes of the spatial structure that rays traverse."""
     avg_recon_overdraw: Value | None = None
-    """Framelets drawn per output pixel; not printed in the thesis. None means ``cache_size / tiling_size``."""
+    """Framelets drawn per output pixel; not printed in the thesis. By default ``cache_size / tiling_size``."""
     per_bvh_node: Value = 16
     """FLOPs per node visited."""
     per_triangle: Value = 64
