@@ -120,7 +120,8 @@ class _Option:
             return self._member_record(copied)
         told = next((mark for mark in self.marks if getattr(mark, "help", None)), None)
         kind = get_args(self.kind)[0] if self.marks else self.kind
-        unset = copied.default in (None, "", ()) or copied.default is copied.default_factory  # both missing
+        given = self.field.default
+        unset = given in (None, "", ()) or given is self.field.default_factory  # both missing
         choices = [str(choice) for choice in get_args(kind) if choice] if get_origin(kind) is Literal else []
         words: dict[str, Any] = {"metavar": f"{{{','.join(choices)}}}"} if choices and unset else {}
         words |= {part: getattr(told, part) for part in ("name", "metavar", "constructor") if getattr(told, part, None)}
