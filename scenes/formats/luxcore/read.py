@@ -129,6 +129,10 @@ class LuxCoreReader(LuxReader):
             self.report.add(str(left.place), f"property {left.key!r}")
 
     def _direct(self, name: str, words: tuple[str, ...], values: list[Values], place: TextPosition) -> None:
+        """Reads a part as a directive; properties with LuxRender's names for LuxCore's are reported."""
+        given = [head[0].split()[1] for head in values[::2]]  # type: ignore[union-attr]
+        for again in sorted({one for one in given if given.count(one) > 1}):
+            self.report.add(str(place), f"{name} {words[0]!r}: property {again!r}, which has another name here")
         self._do(directive(name, words, values, place, self.beside))
 
     # --- textures, volumes, materials ----------------------------------------------------------------------------
