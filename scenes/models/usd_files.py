@@ -26,6 +26,7 @@ from scenes.models.sources import Sources
 from scenes.models.usd_curves import curves_of
 from scenes.models.usd_instances import PointInstances, prims_of
 from scenes.models.usd_library import Gf, Tf, Usd, UsdGeom, UsdLux, UsdShade, UsdSkel, UsdUtils
+from scenes.models.usd_losses import lose_settings, lose_unread
 from scenes.models.usd_materials import UsdMaterials
 from scenes.models.usd_meshes import (
     Triangles,
@@ -119,6 +120,7 @@ class _Reader:
 
     def model(self) -> Model:
         self._bend()
+        lose_settings(self.stage, self.report)
         shown = list(prims_of(self.stage.GetPseudoRoot(), Usd.PrimDefaultPredicate, self.motion))
         tracks = self.motion.tracks(shown)
         for prim in shown:
@@ -145,6 +147,7 @@ class _Reader:
 
     def _add(self, prim: Any, matrix: Matrix, track: RigidTrack | None) -> None:
         """Adds what a prim itself holds."""
+        lose_unread(prim, self.report)
         name = f"{self.sources.path.stem}/{prim.GetName()}"
         if prim.IsA(UsdGeom.PointInstancer):
             self._instances(prim, matrix, track)

@@ -89,9 +89,18 @@ class UsdMaterials:
             if isinstance(value, Reading) and name not in _TEXTURED:
                 self.report.add(where, f"a texture of {name}")
                 given[name] = {**_NUMBERS, **_COLORS}[name]
+        if not isinstance(given["normal"], Reading) and tuple(given["normal"]) != _COLORS["normal"]:
+            self.report.add(where, "a normal that is no picture", "that of the surface")
+        if given["occlusion"] != 1.0:
+            self.report.add(where, "occlusion")
         made, colors = self._as_gltf(given, where)
-        if given["opacity"] == 0.0 and given["opacityThreshold"] <= 0.0:
-            if str(self._constant(shader, "opacityMode") or "transparent") == "transparent":
+        if (
+            given["opacityThreshold"] <= 0.0
+            and str(self._constant(shader, "opacityMode") or "transparent") == "transparent"
+        ):
+            if given["opacity"] != 0.0 and given["opacity"] != 1.0:
+                self.report.add(where, "highlights where a surface is clear (opacityMode transparent)", "none there")
+            elif given["opacity"] == 0.0:
                 made["extensions"] |= {"KHR_materials_transmission": {"transmissionFactor": 1.0},
                                        "KHR_materials_volume": {"thicknessFactor": 1.0}}  # fmt: skip
                 del made["alphaMode"]
@@ -277,7 +286,9 @@ class UsdMaterials:
             )
             source = self._connected(source[0], "in")
         name = "st"
-        if source is not None:
+        if source is None:
+            self.report.add(where, "a picture without texture coordinates", "those of the primvar st")
+        else:
             if source[0].GetShaderId() != "UsdPrimvarReader_float2":
                 self.report.add(where, f"texture coordinates of a node {source[0].GetShaderId()}", "the primvar st")
             name = str(self._constant(source[0], "varname") or "st")

@@ -218,10 +218,9 @@ class LuxReader(LuxMediaReader):
         strength = self._strength(parameters)
         start = self.placed(parameters.numbers("from", 3), (0.0, 0.0, 0.0))
         target = self.placed(parameters.numbers("to", 3), (0.0, 0.0, 1.0))
-        if kind in ("point", "spot"):
-            parameters.number("efficacy", 17.0)
-            if parameters.number("power", 0.0) > 0.0:
-                self.report.add(where, f"the power of a {kind} light", "none: its colour and gain count")
+        parameters.number("efficacy", 17.0)
+        if parameters.number("power", 0.0) > 0.0:
+            self.report.add(where, f"the power of a {kind} light", "none: its colour and gain count")
         if kind == "distant":
             angle_deg = 2.0 * parameters.number("theta", 0.0)
             if not 0.0 <= angle_deg <= 180.0:
