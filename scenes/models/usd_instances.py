@@ -33,11 +33,12 @@ def prims_of(root: Any, among: Any, motion: UsdMotion) -> Iterator[Any]:
         if not imageable:
             continue
         visible = imageable.GetVisibilityAttr()
-        if visible.ValueMightBeTimeVarying():
-            motion.pose.add(prim.GetName(), "an animation of the visibility", "that")
-        if visible.Get(motion.code) == UsdGeom.Tokens.invisible:
-            walk.PruneChildren()
-            continue
+        if visible.HasAuthoredValue():
+            if visible.ValueMightBeTimeVarying():
+                motion.pose.add(prim.GetName(), "an animation of the visibility", "that")
+            if visible.Get(motion.code) == UsdGeom.Tokens.invisible:
+                walk.PruneChildren()
+                continue
         if imageable.ComputePurpose() in (UsdGeom.Tokens.proxy, UsdGeom.Tokens.guide):
             continue
         if prim.IsA(UsdGeom.PointInstancer):

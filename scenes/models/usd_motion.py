@@ -31,6 +31,7 @@ class UsdMotion:
         self._last_s = (last - first) / self._rate if samples else 0.0
         self.pose, self.code = pose, Usd.TimeCode(first + pose.time_s * self._rate)
         self._first, self._now = UsdGeom.XformCache(Usd.TimeCode(first)), UsdGeom.XformCache(self.code)
+        self._moves = bool(samples)
         self._movers: dict[str, str] = {"/": ""}
         self._tracks: dict[str, RigidTrack] = {}
 
@@ -50,6 +51,8 @@ class UsdMotion:
 
     def mover(self, prim: Any) -> str:
         """The path of the nearest prim at or above a prim that moves; empty if there is none."""
+        if not self._moves:
+            return ""
         path = str(prim.GetPath())
         if path not in self._movers:
             xform = UsdGeom.Xformable(prim)

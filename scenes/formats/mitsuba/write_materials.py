@@ -36,6 +36,7 @@ from scenes.canonical import (
     Uber,
 )
 from scenes.canonical.textures import WHITE
+from scenes.formats.appearance.coats import STRONGEST, under_rough_coat
 from scenes.formats.appearance.facets import with_even_facets
 from scenes.formats.appearance.folding import height_of, mean_of
 from scenes.formats.appearance.glass import lose_rays
@@ -208,11 +209,13 @@ class MitsubaSurfaceWriter(ElementWriter):
             # the index whose Fresnel reflectance at normal incidence is that of the coat
             alpha = math.sqrt(material.roughness[0] * material.roughness[1])
             coat = np.array(mean_of(material.specular))
-            most = float(np.clip(coat.max(), 1e-4, 0.25))
+            most = float(np.clip(coat.max(), 1e-4, STRONGEST))
             if coat.max() > most:
-                self.report.add(where, f"a coat that reflects {coat.max():.3g}", f"one that reflects {most:.3g}")
+                became = f"one that reflects {most:.3g}; the matte base reflects the rest"
+                self.report.add(where, f"a coat that reflects {coat.max():.3g}", became)
             index = (1.0 + math.sqrt(most)) / (1.0 - math.sqrt(most))
-            parts = material.diffuse, ConstantTexture(rgb(np.minimum(coat / most, 1.0))), index, alpha
+            base = under_rough_coat(material.diffuse, rgb(coat), most, alpha, where, self.report)
+            parts = base, ConstantTexture(rgb(np.minimum(coat / most, 1.0))), index, alpha
             self.report.add(where, "glossy", f"rough plastic of alpha {alpha:.3g}")
         else:
             assert isinstance(material, Phong)

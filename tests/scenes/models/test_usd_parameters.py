@@ -12,12 +12,13 @@ from typing import Any
 import numpy as np
 import pytest
 from PIL import Image
-from pxr import Sdr  # pyright: ignore[reportMissingImports]
+
 
 from scenes.models.usd_library import Gf, Sdf, Usd
 from tests.scenes.formats.directives.test_parameters import made, shows
 from tests.scenes.models.usd import BOUND, QUAD, READER, ST, material, mesh, texture, written
 
+Sdr: Any = pytest.importorskip("pxr.Sdr")  # without types
 NODES = READER + texture("T", "a.png")
 CURVES = """uniform token type = "cubic"
     uniform token basis = "bspline"
