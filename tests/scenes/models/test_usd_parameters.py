@@ -13,7 +13,6 @@ import numpy as np
 import pytest
 from PIL import Image
 
-
 from scenes.models.usd_library import Gf, Sdf, Usd
 from tests.scenes.formats.directives.test_parameters import made, shows
 from tests.scenes.models.usd import BOUND, QUAD, READER, ST, material, mesh, texture, written

@@ -65,7 +65,8 @@ NOTHING = {
     "thickness",  # between layers that nothing fills
     "environment: screenwindow", "infinite: from", "infinite: to",
     "infinite of a map: from", "hyperboloid: radius",  # what these do not have
-    "point: to", "point: efficacy", "spot: efficacy", "infinite: gamma",  # without a direction, a power or a picture
+    "point: to", "point: efficacy", "spot: efficacy", "distant: efficacy",
+    "infinite: gamma",  # without a direction, a power or a picture
     "coatedconductor: interface.eta", "coatedconductor: remaproughness",  # its coat is reported as a whole
     "mesh: triindices", "trianglemesh: triindices", "loopsubdiv: triindices",  # beside indices, with the same meaning
     "loopsubdiv: N",  # its surface has normals of its own

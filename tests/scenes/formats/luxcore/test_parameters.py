@@ -61,7 +61,8 @@ NEEDED = {
 }  # fmt: skip
 LAMP = "emission = 1 0.5 1", "emission.power = 50", "emission.efficency = 17"
 NOTHING = {
-    "perspective: halffov", "point: efficacy", "spot: efficacy", "inlinedmesh: quadindices",  # of LuxRender
+    "perspective: halffov", "point: efficacy", "spot: efficacy", "distant: efficacy", "sharpdistant: efficacy",
+    "inlinedmesh: quadindices",  # of LuxRender
     "lamp: emission.efficiency", "point: efficiency", "spot: efficiency",  # beside the other spelling
     "matte: sigma", "lamp: sigma",  # which roughmatte alone has
     "orthographic: fieldofview", "environment: fieldofview", "environment: screenwindow",

@@ -71,7 +71,7 @@ def test_glossy_surfaces_are_as_bright_in_mitsuba(base: str, coat: str, eye: str
     own = seen("luxcore", tmp_path / "a.cfg", 8, 64).mean((0, 1))
     found = drawn(load_scene_file(tmp_path / "a.cfg"), "mitsuba", tmp_path, 8, 64).mean((0, 1))
     print(f"base {base}, coat {coat}, from {eye}: {(found / own).round(3).tolist()}")
-    np.testing.assert_allclose(found, own, rtol=0.07)
+    np.testing.assert_allclose(found, own, rtol=0.08)
 
 
 @pytest.mark.skipif(not SIMPLE.is_dir(), reason="the scene files are not beside this project")
