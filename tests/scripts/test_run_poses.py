@@ -34,6 +34,7 @@ PLAIN = (
 )
 
 
+@pytest.mark.slow
 def test_a_run_shows_the_pose_of_each_moment(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture, tmp_path: Path
 ) -> None:
