@@ -79,7 +79,7 @@ REFUSED: dict[str, tuple[str, ...]] = {
     "workloads --inputs nowhere": ("inputs", "nowhere"),
     "workloads --policies nobody": ("policies", "nobody"),
     "workloads --sample-flops 0": ("sample_flops", "between 1", "0.0"),
-    "workloads --sides-px 300": ("sides_px", "512", "300"),
+    "workloads --sides-px 300": ("sides_px", "4096", "300"),
     "workloads --image-hz 8 8": ("image_hz", "none twice"),
     "precision --inputs nowhere": ("inputs", "nowhere"),
     "precision --row 16": ("row", "0 to 15"),
