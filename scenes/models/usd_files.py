@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from scenes.arithmetic import product
+from scenes.arithmetic import determinant, product
 from scenes.canonical import Instance, Light, Material, Matrix, Mesh, RigidTrack, SceneError
 from scenes.canonical.values import vertices_of
 from scenes.formats.losses import LossReport
@@ -113,7 +113,9 @@ class _Reader:
         self.materials = GltfMaterials(document, UsdTextures(document, report), report, facets)
         self.instances = PointInstances(stage, self.motion, report)
         self.up_is_z = UsdGeom.GetStageUpAxis(stage) == UsdGeom.Tokens.z
-        self._made: dict[Hashable, list[_Part]] = {}
+        self._stem = sources.path.stem
+        self._materials: dict[Any, Any] = {}
+        self._made: dict[Hashable, tuple[list[_Part], bool]] = {}
         self._parts: list[Instance] = []
         self._lights: list[Light] = []
         self._cameras: dict[str, ModelCamera] = {}
@@ -123,6 +125,8 @@ class _Reader:
         lose_settings(self.stage, self.report)
         shown = list(prims_of(self.stage.GetPseudoRoot(), Usd.PrimDefaultPredicate, self.motion))
         tracks = self.motion.tracks(shown)
+        bound = UsdShade.MaterialBindingAPI.ComputeBoundMaterials(shown)[0]
+        self._materials = {prim.GetPath(): material for prim, material in zip(shown, bound, strict=True)}
         for prim in shown:
             self.instances.admit(prim)
             self._add(prim, self.motion.matrix(prim), tracks.get(self.motion.mover(prim)))
@@ -147,27 +151,28 @@ class _Reader:
 
     def _add(self, prim: Any, matrix: Matrix, track: RigidTrack | None) -> None:
         """Adds what a prim itself holds."""
+        name = f"{self._stem}/{prim.GetName()}"
+        if prim.IsA(UsdGeom.Gprim):
+            if determinant(matrix[:3, :3]) == 0.0:
+                self.report.add(prim.GetName(), "a node without extent")
+                return
+            parts, both = self._shapes(prim)
+            for shape, material, local in parts:
+                place = product(matrix, local)
+                self._parts.append(Instance(shape, material, place, track, name, emission_twosided=both))
+            return
         lose_unread(prim, self.report)
-        name = f"{self.sources.path.stem}/{prim.GetName()}"
         if prim.IsA(UsdGeom.PointInstancer):
             self._instances(prim, matrix, track)
         elif prim.IsA(UsdGeom.Camera):
             key = prim.GetName() if prim.GetName() not in self._cameras else str(prim.GetPath())
             note_animated(prim, self.motion.pose)
             self._cameras[key] = camera_of(prim, self.code, matrix, track, self.report)
-        elif prim.HasAPI(UsdLux.LightAPI) and not prim.IsA(UsdGeom.Gprim):
+        elif prim.HasAPI(UsdLux.LightAPI):
             self._light(prim, matrix, track, name)
-        elif prim.IsA(UsdGeom.Gprim):
-            if abs(np.linalg.det(matrix[:3, :3])) == 0.0:
-                self.report.add(prim.GetName(), "a node without extent")
-                return
-            both = bool(UsdGeom.Gprim(prim).GetDoubleSidedAttr().Get())
-            for shape, material, local in self._shapes(prim):
-                place = product(matrix, local)
-                self._parts.append(Instance(shape, material, place, track, name, emission_twosided=both))
 
     def _light(self, prim: Any, matrix: Matrix, track: RigidTrack | None, name: str) -> None:
-        if abs(np.linalg.det(matrix[:3, :3])) == 0.0:
+        if determinant(matrix[:3, :3]) == 0.0:
             self.report.add(prim.GetName(), "a light without extent")
             return
         note_animated(prim, self.motion.pose)
@@ -187,9 +192,11 @@ class _Reader:
             for one, local in inner:
                 self._add(one, product(place, local), track)
 
-    def _shapes(self, prim: Any) -> list[_Part]:
-        """Shapes of a prim with their materials, in its space; instances of one prototype share them if they inherit
-        the same materials and primvars."""
+    def _shapes(self, prim: Any) -> tuple[list[_Part], bool]:
+        """Shapes of a prim with their materials, in its space, and whether they have both sides.
+
+        Instances of one prototype share them if they inherit the same materials and primvars.
+        """
         key: tuple[Hashable, ...] = (str(prim.GetPath()),)
         if prim.IsInstanceProxy():
             bound = [self._bound(one) for one in (prim, *prim.GetChildren())]
@@ -197,7 +204,8 @@ class _Reader:
             key = _shared(prim), *(_shared(material.GetPrim()) if material else "" for material in bound)
             key += tuple(sorted((one.GetName(), _shared(one.GetAttr().GetPrim())) for one in primvars))
         if key not in self._made:
-            self._made[key] = self._read(prim)
+            lose_unread(prim, self.report)
+            self._made[key] = self._read(prim), bool(UsdGeom.Gprim(prim).GetDoubleSidedAttr().Get())
         return self._made[key]
 
     def _read(self, prim: Any) -> list[_Part]:
@@ -274,8 +282,9 @@ class _Reader:
 
     def _bound(self, prim: Any) -> Any:
         """The material that is bound to a prim; None without one."""
-        material = UsdShade.MaterialBindingAPI(prim).ComputeBoundMaterial()[0]
-        return material if material else None
+        found = self._materials.get(prim.GetPath())
+        found = UsdShade.MaterialBindingAPI(prim).ComputeBoundMaterial()[0] if found is None else found
+        return found or None
 
 
 def _shared(prim: Any) -> str:

@@ -16,7 +16,7 @@ from scenes.models.usd_library import Usd, UsdGeom, UsdLux
 from scenes.models.usd_motion import UsdMotion
 
 INSTANCES_MOST = 1 << 20
-_HOLDERS = UsdGeom.Gprim, UsdGeom.PointInstancer, UsdGeom.Camera
+_HOLDERS = UsdGeom.PointInstancer, UsdGeom.Camera
 _DEPTH_MAX = 32
 _AMONG = Usd.PrimIsActive & Usd.PrimIsLoaded  # prototypes may lie below a class, or an override alone
 Inner = list[tuple[Any, Matrix]]
@@ -43,7 +43,7 @@ def prims_of(root: Any, among: Any, motion: UsdMotion) -> Iterator[Any]:
             continue
         if prim.IsA(UsdGeom.PointInstancer):
             walk.PruneChildren()
-        if prim.HasAPI(UsdLux.LightAPI) or any(prim.IsA(kind) for kind in _HOLDERS):
+        if prim.IsA(UsdGeom.Gprim) or prim.HasAPI(UsdLux.LightAPI) or any(prim.IsA(kind) for kind in _HOLDERS):
             yield prim
 
 
