@@ -62,7 +62,7 @@ def front_file(points: pd.DataFrame, options: TradeOptions) -> dict[str, Any] | 
     made = {
         "scale": options.scale,
         "seconds": options.seconds,
-        "inputs": [Path(name).name for name in dict.fromkeys(own["input"])],
+        "inputs": ["/".join(Path(name).parts[-2:]) for name in dict.fromkeys(own["input"])],
         "seeds": sorted({int(seed) for seed in own["seed"]}),
         "ledger": options.ledger,
         "settings": len(kept),

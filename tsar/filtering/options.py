@@ -54,8 +54,11 @@ class FilterOptions:
     memory_s: float = 0.2
 
     def samples_max(self, pixels: int) -> int:
-        """Maximum number of samples of a cycle in a picture of so many pixels. Below ``SMALL_PX`` squared the share
-        grows with the root of ``SMALL_PX`` over the side, because a tile covers more of a small picture."""
+        """Maximum number of samples of a cycle in a picture of so many pixels.
+
+        Below ``SMALL_PX`` squared the share grows with the root of ``SMALL_PX`` over the side: at 64 x 64 pixels longer
+        cycles have less error (docs/results/rivals.md).
+        """
         longer = sqrt(SMALL_PX / sqrt(min(pixels, SMALL_PX**2)))
         return min(pixels, int(self.share_max * longer * pixels))
 

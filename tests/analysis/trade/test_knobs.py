@@ -184,8 +184,9 @@ def test_nothing_measured_gives_empty_tables() -> None:
 
 def test_the_front_is_stored_for_each_pixel_and_second(tmp_path: Any) -> None:
     points = point_table(results(), "work")
+    points["input"] = points["input"].replace("planescene", "/scenes/cornell-box/scene.pbrt")
     stored = front_file(points, OPTIONS)
-    assert stored is not None and stored["made"]["inputs"] == ["chase", "planescene"]
+    assert stored is not None and stored["made"]["inputs"] == ["chase", "cornell-box/scene.pbrt"]
     write_json(tmp_path / "front.json", stored)
     front = read_front(tmp_path / "front.json")
     assert [place.batch for place in front.places] == [16, 32, 64, 256, 512]
