@@ -62,7 +62,10 @@ _SWITCHES = {
     "noise": "noise of random samples told from detail",
 }
 _NUMBERS: dict[str, tuple[str, tuple[Value, ...]]] = {
-    "share_max": ("longest cycle, as a share of the pixels of a picture of 256² or more", (1 / 128, 1 / 64, 1 / 16, 1 / 8)),
+    "share_max": (
+        "longest cycle, as a share of the pixels of a picture of 256² or more",
+        (1 / 128, 1 / 64, 1 / 16, 1 / 8),
+    ),
     "footprint": ("samples along a pixel's side that textures are filtered for", (1, 2, 8)),
     "latency_cycles": ("cycles from sampling to display", (2, 3)),
     "memory_s": ("time that observed change is remembered, seconds", (0.05, 0.8)),
