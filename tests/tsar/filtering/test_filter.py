@@ -74,6 +74,15 @@ def test_surfaces_are_followed() -> None:
     assert max(found["tsar"], found["surfel"]) < 0.5 * found["filter"], found
 
 
+def test_a_picture_is_right_in_the_middle_of_its_display() -> None:
+    """Half a cycle of motion before and after, its error is at least 1.5 times as large; so errors of moments that meet
+    cycles at changing phases swing."""
+    screen = panned(120.0)
+    last = shown(POLICIES["tsar"](Setting(CONFIG, stages, view=screen.view)), screen, 1.0)[-1]
+    start, middle, end = (error(last, screen, last.display_time_s + share * CYCLE_S) for share in (0.0, 0.5, 1.0))
+    assert min(start, end) > 1.5 * middle, (start, middle, end)
+
+
 def test_without_poses_nothing_is_reprojected() -> None:
     screen = panned(0.0)
     options = FilterOptions(reprojection=False)
