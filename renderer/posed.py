@@ -21,6 +21,7 @@ POSES_HZ = 60.0
 """Poses a second. A pose holds from half an interval before its time to half an interval after it."""
 
 STANDING_STILL = (
+    "poses that are named are those of the first time: "
     f"what does not move rigidly is read anew {POSES_HZ:g} times a second; policies take its surface as standing still"
 )
 """The loss of a scene with poses."""

@@ -32,7 +32,7 @@ from analysis.perception.server import serving
 from analysis.perception.stimuli import differences, render_stimuli
 from analysis.perception.trials import CONDITIONS, read_trials, undisturbed
 from analysis.storage.files import atomic, write_table
-from analysis.storage.results import own_results
+from analysis.storage.results import reserved
 from analysis.storage.summary import write_summary
 from analysis.tracer.options import LEVELS
 
@@ -73,9 +73,8 @@ def run(options: Options) -> str:
         FiguresOptions: figures,
         AnomalyOptions: anomaly,
     }
-    with bad_input():
-        own_results(options.out, _FILES.get(type(options), _TABLES))
-    with bad_input(), full_disk(options.out, FilmError), bars() as shown:
+    names = _FILES.get(type(options), _TABLES)
+    with bad_input(), reserved(options.out, names), full_disk(options.out, FilmError), bars() as shown:
         found, text = steps[type(options)](options, shown)
         write_summary(options.out, found, options, seed=options.seed)
     return text

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
 from fnmatch import fnmatch
 from pathlib import Path
 
@@ -43,6 +44,21 @@ def own_results(folder: Path, names: Iterable[str]) -> None:
             more = f" and {len(foreign) - 1} more" if len(foreign) > 1 else ""
             raise ValueError(f"out: expected no file that this command did not make, found {foreign[0]}{more}; move it")
     journal.append({"taken": wanted})
+
+
+@contextmanager
+def reserved(folder: Path, names: Iterable[str]) -> Iterator[None]:
+    """As :func:`own_results`, for a command that reads its input afterwards: where the block refuses the input before
+    it has written anything into a new folder, no name stays reserved there."""
+    fresh = not (folder / JOURNAL).exists()
+    own_results(folder, names)
+    before = set(folder.iterdir())
+    try:
+        yield
+    except (OSError, ValueError):
+        if fresh and set(folder.iterdir()) == before:
+            (folder / JOURNAL).unlink()
+        raise
 
 
 def _foreign(folder: Path, wanted: Iterable[str], taken: set[str]) -> Iterator[Path]:

@@ -12,7 +12,10 @@ from scenes import catalog
 from scenes.canonical import Scene
 from scenes.models.scenes_of_models import content_of, is_posed
 
-ANEW = "what does not move rigidly is read anew for each frame, and stands still while the shutter is open"
+ANEW = (
+    "poses that are named are those of the first frame: "
+    "what does not move rigidly is read anew for each frame, and stands still while the shutter is open"
+)
 
 
 class Posing:

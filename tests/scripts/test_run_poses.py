@@ -46,7 +46,7 @@ def test_a_run_shows_the_pose_of_each_moment(
         return capsys.readouterr().out, json.loads((out / "summary.json").read_text())
 
     said, before = run()
-    assert "is read anew 60 times a second; policies take its surface as standing still" in said
+    assert "those of the first time: what does not move rigidly is read anew 60 times a second; policies take" in said
     for number in range(4):
         still = tmp_path / f"still{number}"
         of = "--time-s", str(number / 4), "--size", "64x64", "--samples", "16", "--layers", "--format", "exr"

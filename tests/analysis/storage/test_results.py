@@ -11,8 +11,8 @@ from pathlib import Path
 import pytest
 
 from analysis.command.ownership import release_folders
-from analysis.storage.results import own_results
-from analysis.storage.store import Store
+from analysis.storage.results import own_results, reserved
+from analysis.storage.store import JOURNAL, Store
 from renderer.compute import device
 from tests.durable import KINDS
 from tests.scripts.commands import call_script, one_line
@@ -127,3 +127,15 @@ def test_a_command_that_was_killed_goes_on(tmp_path: Path) -> None:
     status = subprocess.run([sys.executable, "-c", killed, str(tmp_path)], cwd=root, env=os.environ).returncode
     assert status == -9 and (tmp_path / "film.mp4").exists()
     taken(tmp_path, ("film.mp4",))
+
+
+@pytest.mark.parametrize(("file", "before", "kept"), [("", False, False), ("a.csv", False, True), ("", True, True)])
+def test_names_stay_reserved_unless_the_input_was_refused(tmp_path: Path, file: str, before: bool, kept: bool) -> None:
+    if before:
+        taken(tmp_path, ("a.csv",))
+    with pytest.raises(ValueError, match="no such table"), reserved(tmp_path, ("a.csv",)):
+        assert (tmp_path / JOURNAL).exists()
+        if file:
+            (tmp_path / file).touch()
+        raise ValueError("no such table")
+    assert (tmp_path / JOURNAL).exists() == kept
