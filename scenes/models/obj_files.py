@@ -65,7 +65,7 @@ def read_obj(sources: Sources, report: LossReport, facets: bool = False) -> tupl
     for keyword in sorted(file.unread):
         report.add(stem, f"lines of the kind {keyword!r}")
     if file.few:
-        report.add(stem, f"{file.few} faces of fewer than three corners")
+        report.add(stem, f"faces of fewer than three corners ({file.few})")
     materials = _materials(file.libraries, sources, report, facets)
     points = _table(file.points, (3, 4, 6, 7, 8), "v")
     uvs, normals = _table(file.uvs, (1, 2, 3), "vt"), _table(file.normals, (3,), "vn")

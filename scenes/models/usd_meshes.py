@@ -87,7 +87,7 @@ def triangles_of(mesh: Any, code: Any, where: str, report: LossReport) -> Triang
         of_polygon = surface.polygon
     few = int(((counts < 3) & ~hole[of_polygon]).sum())
     if few:
-        report.add(where, f"{few} faces of fewer than three corners")
+        report.add(where, f"faces of fewer than three corners ({few})")
     drawn = (counts >= 3) & ~hole[of_polygon]
     if not drawn.any():
         return None

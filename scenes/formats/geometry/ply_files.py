@@ -259,7 +259,7 @@ def _triangles(
         return corners.reshape(-1, 3)
     few = counts < 3
     if few.any():
-        report.add(name, f"{few.sum()} faces of fewer than three corners")
+        report.add(name, f"faces of fewer than three corners ({few.sum()})")
         corners, counts = corners[~np.repeat(few, counts)], counts[~few]
     check_numbers(points, corners, normals, uvs, name)
     triangles = triangles_of(points.astype(np.float64), corners.astype(np.int64), counts)

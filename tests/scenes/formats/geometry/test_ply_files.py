@@ -157,7 +157,7 @@ def test_faces_of_few_corners_and_other_lists_are_losses() -> None:
     mesh = read_ply(content + b"1 0\n0\n", "a.ply", report)
     np.testing.assert_array_equal(mesh.faces, [[0, 1, 2], [0, 2, 3], [0, 1, 4]])
     assert [loss.what for loss in report.losses] == [
-        "2 elements of the kind 'range_grid'", "3 faces of fewer than three corners",
+        "2 elements of the kind 'range_grid'", "faces of fewer than three corners (3)",
     ]  # fmt: skip
 
 
