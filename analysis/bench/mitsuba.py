@@ -48,7 +48,7 @@ def missing(variant: str) -> str:
     if not installed("mitsuba"):
         return NOT_INSTALLED
     if variant.startswith("llvm") and find_llvm() is None:
-        return "libllvm19 not found"
+        return "no library of LLVM 19 (Debian's package libllvm19)"
     return ""
 
 

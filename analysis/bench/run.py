@@ -13,6 +13,7 @@ from analysis.bench.large import large
 from analysis.bench.machine import machine, versions
 from analysis.bench.options import ON_CPU_ONLY, BenchOptions
 from analysis.bench.overhead import overhead
+from analysis.bench.peers import missing_peers
 from analysis.bench.policy import policy
 from analysis.bench.rays import coherent, incoherent
 from analysis.bench.rows import SPREAD, Group, Row
@@ -75,10 +76,11 @@ def run_bench(options: BenchOptions) -> dict[str, Any]:
     }
     rows: list[Row] = []
     found: dict[str, Any] = {**place, "rows": []}
+    groups = [name for name in options.groups if options.device == "cpu" or name not in ON_CPU_ONLY]
     with progress.bars() as bars, full_disk(options.out):
-        for name in options.groups:
-            if options.device != "cpu" and name in ON_CPU_ONLY:
-                continue
+        for line in missing_peers(groups):
+            bars.say(line)
+        for name in groups:
             rows += MEASURED_BY[name](options, bars)
             found = {**place, "rows": [row.record() for row in rows]}
             write_json(options.out / f"bench{ending}.json", found)
