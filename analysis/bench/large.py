@@ -204,14 +204,15 @@ def instances(mesh: Mesh, count: int) -> Scene:
     return Scene(PerspectiveCamera(eye, FOV_DEG), tuple(placed), (light,), integrator=Integrator("direct", depth=0))
 
 
+def cycle_config(side: int, batch: int) -> TsarConfig:
+    """Settings of a cycle at so many pixels along a side; the cache holds as many batches as by default."""
+    cached = TsarConfig.cache_size // TsarConfig.batch_size * batch
+    return TsarConfig(batch_size=batch, resolution_px=side, cache_size=cached, warmup_cycles=_WARMUP_CYCLES)
+
+
 def cycle_row(options: BenchOptions, task: Task, cases: Sequence[tuple[int, int]]) -> Row:
     """Time of a whole cycle against pixels, on all cores, with batches in proportion."""
-    running = {
-        str(side): RunningPipeline(
-            TsarConfig(batch_size=batch, resolution_px=side, warmup_cycles=_WARMUP_CYCLES), synthetic_trace, 1
-        )
-        for side, batch in cases
-    }
+    running = {str(side): RunningPipeline(cycle_config(side, batch), synthetic_trace, 1) for side, batch in cases}
     take_turns(running, options.repetitions, task)
     rounds = [[sum(turn[0].values()) for turn in case.turns()] for case in running.values()]
     least, most = cases[0], cases[-1]

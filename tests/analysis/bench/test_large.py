@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from analysis.bench.large import cycle_row, instance_rows, instances, memory_row, mesh_rows
+from analysis.bench.large import CYCLES, cycle_config, cycle_row, instance_rows, instances, memory_row, mesh_rows
 from analysis.bench.options import BenchOptions
 from analysis.bench.scenes import bumpy_globe
 from analysis.command.progress import Task
@@ -56,3 +56,9 @@ def test_instances_share_their_mesh(monkeypatch: pytest.MonkeyPatch) -> None:
 def test_cycles_of_growing_pictures() -> None:
     row = cycle_row(OPTIONS, Task(), ((64, 4), (128, 16)))
     assert row.group == "large" and row.repetitions == 7 and row.note.startswith("4,096: ")
+
+
+def test_cycles_of_the_measured_sizes_have_room_for_a_batch() -> None:
+    for side, batch in CYCLES:
+        config = cycle_config(side, batch)
+        assert config.cache_size == 16 * batch and config.resolution_px == side
