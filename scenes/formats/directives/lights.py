@@ -14,6 +14,7 @@ from scenes.canonical.values import Matrix
 from scenes.formats.appearance.spectra import rgb
 from scenes.formats.directives.syntax import Parameters
 from scenes.formats.geometry.conventions import MAP_AXES
+from scenes.formats.geometry.transform_stack import TransformStack
 from scenes.formats.losses import LossReport
 
 
@@ -23,6 +24,13 @@ def lamp(kind: str, parameters: Parameters, start: Rgb, strength: Rgb, report: L
         parameters.asked.update(parameters.given)
         report.add(str(parameters.place), f"light {kind!r}", "a point light of equal intensity in all directions")
     return PointLight(start, strength)
+
+
+def beside_origin(parameters: Parameters, transforms: TransformStack) -> Rgb:
+    """The place of a point light of PBRT v3 and LuxRender: the origin of its space, plus ``from`` along the axes of the
+    world (``CreatePointLight`` of PBRT v3; measured with LuxCore)."""
+    origin, offset = transforms.current[0][:3, 3], parameters.numbers("from", 3)
+    return rgb(origin if offset is None else origin + offset)
 
 
 def spot(

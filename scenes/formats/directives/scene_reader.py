@@ -102,7 +102,7 @@ class SceneReader(DirectiveReader):
         return scene
 
     def _begin_world(self, directive: Directive) -> None:
-        self.transforms.replace(np.eye(4))
+        self.transforms.begin_world()
 
     def read_texture(self, directive: Directive) -> None:
         name, kind, wanted = word(directive), word(directive, 2), word(directive, 1)

@@ -161,10 +161,7 @@ class ShapeReader:
         patches, vertices = indices.reshape(-1, 4), points.reshape(-1, 3)
         arrays = []
         for name, width in (("N", 3), ("uv", 2)):
-            found = parameters.numbers(name)
-            if found is not None and len(found) != width * len(vertices):
-                raise SceneError(f"{where}: {name}: expected {width * len(vertices)} numbers, got {len(found)}")
-            arrays.append(None if found is None else found.reshape(-1, width))
+            arrays.append(self._at_corners(name, parameters.numbers(name), width, len(vertices), where))
         made = checked_mesh(vertices, patches[:, [0, 1, 3, 0, 3, 2]].reshape(-1, 3), arrays[0], arrays[1], where)
         corners = vertices[patches.astype(np.int64)]
         bent = np.abs(corners[:, 0] + corners[:, 3] - corners[:, 1] - corners[:, 2]).max(axis=1)
@@ -175,23 +172,25 @@ class ShapeReader:
     def _triangles(self, parameters: Parameters) -> Mesh:
         points, indices = parameters.numbers("P"), self._indices(parameters)
         where = str(parameters.place)
+        if indices is None and points is not None and len(points) == 9:  # one triangle, as in PBRT v4
+            indices = np.arange(3.0)
         if points is None or indices is None or len(points) % 3 or len(indices) % 3 or not len(indices):
             raise SceneError(f"{where}: expected points P and indices, in threes")
         normals = parameters.numbers("N")
         pairs = [found for found in (parameters.numbers(name) for name in ("uv", "st")) if found is not None]
         if parameters.numbers("S") is not None:
             self.report.add(where, "tangents S of a mesh", "those of its texture coordinates")
-        count = len(points) // 3
-        for name, array, width in (("N", normals, 3), ("uv", pairs[0] if pairs else None, 2)):
-            if array is not None and len(array) != width * count:
-                raise SceneError(f"{where}: {name}: expected {width * count} numbers, got {len(array)}")
-        return checked_mesh(
-            points.reshape(-1, 3),
-            indices.reshape(-1, 3),
-            None if normals is None else normals.reshape(-1, 3),
-            pairs[0].reshape(-1, 2) if pairs else None,
-            where,
-        )
+        vertices = points.reshape(-1, 3)
+        normals = self._at_corners("N", normals, 3, len(vertices), where)
+        uvs = self._at_corners("uv", pairs[0] if pairs else None, 2, len(vertices), where)
+        return checked_mesh(vertices, indices.reshape(-1, 3), normals, uvs, where)
+
+    def _at_corners(self, name: str, found: np.ndarray | None, width: int, count: int, where: str) -> np.ndarray | None:
+        """Values of each vertex; of another count they are left out, as in PBRT, which is reported."""
+        if found is not None and len(found) != width * count:
+            self.report.add(where, f"{name} of a mesh: {len(found)} numbers for {count} points")
+            return None
+        return None if found is None else found.reshape(-1, width)
 
 
 def _apart(heights: tuple[float, float], parameters: Parameters) -> tuple[float, float]:

@@ -276,7 +276,7 @@ def _unquoted(text: str) -> str:
 
 
 def parameters_of(directive: Directive, skip: int) -> Parameters:
-    """Parameters of a directive after its first ``skip`` values: pairs of ``"type name"`` and values.
+    """Parameters of a directive after its first ``skip`` values, of which the last of each name counts.
 
     Raises:
         SceneError: a declaration is malformed, or has no value.
@@ -294,6 +294,6 @@ def parameters_of(directive: Directive, skip: int) -> Parameters:
         kind, name = head[0].split()
         if at + 1 >= len(rest):
             raise SceneError(f"{directive.place}: {directive.name}: expected a value for {name!r}, got none")
-        if name not in given:  # the first counts, as in PBRT
+        if types.get(name) != "texture" or kind == "texture":  # PBRT and LuxRender look for a texture first
             given[name], types[name] = rest[at + 1], kind
     return Parameters(directive.place, given, types)

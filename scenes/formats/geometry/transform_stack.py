@@ -165,6 +165,12 @@ class TransformStack:
         """Sets the transform, at the active keys."""
         self.current = [matrix if on else old for on, old in zip(self.active, self.current, strict=True)]
 
+    def begin_world(self) -> None:
+        """Sets the identity at all keys, which is the space ``world``, and makes all keys active."""
+        self.active = (True,) * len(self.current)
+        self.replace(np.eye(4))
+        self.named["world"] = list(self.current)
+
     def apply(self, matrix: Matrix) -> None:
         """Applies a transform inside the current one, at the active keys."""
         made = {id(old): product(old, matrix) for old in {id(old): old for old in self.current}.values()}

@@ -23,6 +23,7 @@ from scenes.formats.appearance.spectra import grey, rgb
 from scenes.formats.directives.reader import checked
 from scenes.formats.directives.scene_reader import scene_of
 from scenes.formats.directives.syntax import Directive, Parameters, Values, parameters_of
+from scenes.formats.geometry.transform_stack import translation
 from scenes.formats.losses import LossReport
 from scenes.formats.luxcore.defaults import drop_meaningless
 from scenes.formats.luxcore.directives import directive, numbers, parameters, texts
@@ -271,7 +272,10 @@ class LuxCoreReader(LuxReader):
 
     def _light_block(self, name: str, block: Block, place: TextPosition) -> None:
         kind = block.pop("type").word() if "type" in block else "sky2"
-        self._place(self._matrix(block, "transformation"))
+        place_of = self._matrix(block, "transformation")
+        if kind in ("point", "mappoint") and "position" in block:  # a point in the light's space, unlike LuxRender's
+            place_of = product(place_of, translation(*block.pop("position").numbers(3).tolist()))
+        self._place(place_of)
         kind, values = light_values(kind, block, self.report)
         self._direct("LightSource", (kind,), values, place)
 

@@ -230,7 +230,7 @@ class LuxReader(LuxMediaReader):
         elif kind == "spot":
             self.lights.append(lights.spot(parameters, start, target, strength, "secant"))
         else:
-            even = rgb(np.array(strength) / SPHERE_SR)
+            even, start = rgb(np.array(strength) / SPHERE_SR), lights.beside_origin(parameters, self.transforms)
             self.lights.append(lights.lamp(kind, parameters, start, even, self.report))
 
     def _daylight(self, kind: str, parameters: Parameters) -> None:

@@ -192,10 +192,9 @@ def transform_of(node: XmlNode) -> Matrix:
         elif step.tag == "scale":
             made = scaling(*triple(step, 1.0))
         elif step.tag == "rotate":
-            axis = [numbers(step, step.get(name, "0"), 1)[0] for name in "xyz"]
-            made = rotation(numbers(step, step.get("angle", "0"), 1)[0], *axis)
+            made = rotation(numbers(step, step.get("angle", "0"), 1)[0], *triple(step, 0.0))
         elif step.tag == "matrix":
-            made = np.array(numbers(step, step.get("value"), 16)).reshape(4, 4)
+            made = _matrix(step)
         elif step.tag in ("lookat", "lookAt"):
             made = _looked_along(step)
         else:
@@ -205,6 +204,16 @@ def transform_of(node: XmlNode) -> Matrix:
     if plain is None or not invertible(plain):
         raise SceneError(f"{node.place}: transform: expected one that can be inverted, without perspective")
     return plain
+
+
+def _matrix(step: XmlNode) -> Matrix:
+    """A matrix of sixteen numbers, or of nine without translation, row by row."""
+    found = numbers(step, step.get("value"), None)
+    if len(found) == 9:
+        made = np.eye(4)
+        made[:3, :3] = np.reshape(found, (3, 3))
+        return made
+    return np.array(numbers(step, step.get("value"), 16)).reshape(4, 4)
 
 
 def _looked_along(step: XmlNode) -> Matrix:

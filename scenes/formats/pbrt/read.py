@@ -12,7 +12,7 @@ from typing import ClassVar
 import numpy as np
 
 from scenes import loading
-from scenes.canonical import EnvironmentLight, Integrator, Medium, Rgb, Sampler, Scene
+from scenes.canonical import EnvironmentLight, Instance, Integrator, Medium, Rgb, Sampler, Scene
 from scenes.formats.appearance.media import as_drawn_by
 from scenes.formats.appearance.spectra import rgb
 from scenes.formats.directives import lights
@@ -120,7 +120,8 @@ class PbrtReader(SceneReader):
         start = self.placed(parameters.numbers("from", 3), (0.0, 0.0, 0.0))
         target = self.placed(parameters.numbers("to", 3), (0.0, 0.0, 1.0)) if kind in ("spot", "distant") else start
         if kind in ("point", "projection", "goniometric"):
-            self.lights.append(lights.lamp(kind, parameters, start, strength, self.report))
+            place = lights.beside_origin(parameters, self.transforms)
+            self.lights.append(lights.lamp(kind, parameters, place, strength, self.report))
         elif kind == "spot":
             self.lights.append(lights.spot(parameters, start, target, strength, "quartic"))
         elif kind == "distant":
@@ -141,6 +142,13 @@ class PbrtReader(SceneReader):
         if path is None:
             return lights.even_environment(strength)
         return lights.environment_map(loading.read_image(path), self.transforms.current[0], strength, path)
+
+    def _keep(self, instance: Instance, directive: Directive) -> None:
+        if self._object is not None and instance.emission is not None:
+            self.report.add(
+                str(directive.place), "an area light inside an object, which PBRT does not sample", "a lamp"
+            )
+        super()._keep(instance, directive)
 
     def _read_area_light(self, directive: Directive) -> None:
         kind, parameters = typed(directive)

@@ -78,7 +78,8 @@ class PbrtV4Reader(PbrtReader):
     def _do(self, directive: Directive) -> None:
         target = _TARGETS.get(directive.name)
         if target and self.attributes.assumed:
-            pairs = (pair for (to, _), pair in self.attributes.assumed.items() if to == target)
+            own = parameters_of(directive, 3 if directive.name == "Texture" else 1).given
+            pairs = (pair for (to, name), pair in self.attributes.assumed.items() if to == target and name not in own)
             found = (value for pair in pairs for value in pair)
             directive = directive._replace(values=(*directive.values, *found))
         super()._do(directive)

@@ -97,14 +97,14 @@ def texts(dialect: str) -> Iterator[str]:
     materials = found.materials.split()
     yield from (f'{bare}Material "{kind}" "float roughness" .2 {{}}\nShape "sphere"\n' for kind in materials)
     yield from (f'{bare}Shape "{kind}" {{}}\n' for kind in SHAPES)
-    yield from (f'{bare}Shape "{mesh}" {{}} {POINTS}\n' for mesh in (found.mesh, "loopsubdiv"))
+    yield from (f'{bare}Shape "{mesh}" {POINTS} {{}}\n' for mesh in (found.mesh, "loopsubdiv"))
     yield from (
         f'{bare}{{}}Integrator "volpath"\n'.replace("{}", f'{one}Shape "sphere"\n') for one in found.media.split("|")
     )
     if dialect != "luxrender":
-        yield f'{bare}Shape "curve" {{}} "point P" [ 0 0 0 1 1 0 2 0 0 3 1 0 4 0 0 5 1 0 6 0 1 ]\n'
+        yield f'{bare}Shape "curve" "point P" [ 0 0 0 1 1 0 2 0 0 3 1 0 4 0 0 5 1 0 6 0 1 ] {{}}\n'
     if dialect == "pbrt4":
-        yield f'{bare}Shape "bilinearmesh" {{}} {POINTS.replace("0 1 0 ]", "0 1 0 1 1 0 ]").replace("2 ]", "2 3 ]")}\n'
+        yield f'{bare}Shape "bilinearmesh" {POINTS.replace("0 1 0 ]", "0 1 0 1 1 0 ]").replace("2 ]", "2 3 ]")} {{}}\n'
     use = f'Material "{materials[0]}" "texture {found.base}" "t"\nShape "sphere"\n'
     yield f'{bare}Texture "t" "{found.color}" "imagemap" "string filename" "a.png" {{}}\n{use}'
     for kind in (*TEXTURES, *found.textures.split()):

@@ -1,0 +1,116 @@
+"""What reports in public trackers of PBRT and LuxRender turned up: parameters, spaces, lights and meshes.
+
+Sources: ``paramset.cpp``, ``api.cpp``, ``lights/point.cpp`` and ``shapes/triangle.cpp`` of PBRT v3; LuxCore 2.10.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from scenes.canonical import ConstantTexture, Matte, Mesh, PointLight
+from scenes.formats.conversion import load_scene_file, save_scene_file
+from scenes.formats.losses import LossReport
+from tests.scenes.formats.files import HEAD, pbrt
+
+V4 = 'Film "rgb"\nCamera "perspective"\nWorldBegin\n'
+POINT = 'Rotate 90 0 0 1\nTranslate 0 0 5\nScale 2 2 2\nLightSource "point" "{}" [ 1 0 0 ]\nShape "sphere"\n'
+
+
+def _light(scene) -> PointLight:
+    (found,) = scene.lights
+    assert isinstance(found, PointLight)
+    return found
+
+
+@pytest.mark.parametrize("name", ["a.pbrt", "a.lxs"])
+@pytest.mark.parametrize(
+    ("given", "expected"),
+    [
+        ('"color Kd" [ 1 0 0 ] "color Kd" [ 0 1 0 ]', (0.0, 1.0, 0.0)),
+        ('"color Kd" [ 1 0 0 ] "texture Kd" "t"', (0.0, 0.0, 1.0)),
+        ('"texture Kd" "t" "color Kd" [ 1 0 0 ]', (0.0, 0.0, 1.0)),
+    ],
+)
+def test_the_last_value_of_a_parameter_counts_and_a_texture_before_it(
+    name: str, given: str, expected: tuple[float, float, float], tmp_path: Path
+) -> None:
+    texture = 'Texture "t" "color" "constant" "color value" [ 0 0 1 ]\n'
+    scene, losses = pbrt(tmp_path, f'{texture}Material "matte" {given}\nShape "sphere"\n', name=name)
+    assert scene.instances[0].material == Matte(ConstantTexture(expected)) and not losses
+
+
+def test_a_parameter_of_a_directive_counts_before_that_of_an_attribute(tmp_path: Path) -> None:
+    body = 'Attribute "material" "rgb reflectance" [ 1 0 0 ]\nMaterial "diffuse" "rgb reflectance" [ 0 1 0 ]\n'
+    scene, _ = pbrt(tmp_path, f'{body}Shape "sphere"\n', V4)
+    assert scene.instances[0].material == Matte(ConstantTexture((0.0, 1.0, 0.0)))
+
+
+@pytest.mark.parametrize(
+    ("name", "head", "kind", "expected"),
+    [
+        ("a.pbrt", HEAD, "point from", (1.0, 0.0, 5.0)),
+        ("a.lxs", HEAD, "point from", (1.0, 0.0, 5.0)),
+        ("a.pbrt", V4, "point3 from", (0.0, 2.0, 5.0)),
+    ],
+)
+def test_the_place_of_a_point_light_is_turned_with_its_space_in_version_4_alone(
+    name: str, head: str, kind: str, expected: tuple[float, float, float], tmp_path: Path
+) -> None:
+    scene, _ = pbrt(tmp_path, POINT.format(kind), head, name)
+    assert _light(scene).position == pytest.approx(expected, abs=1e-9)
+
+
+def test_the_place_of_a_point_light_of_luxcore_is_turned_with_its_space(tmp_path: Path) -> None:
+    path = tmp_path / "a.scn"
+    path.write_text(
+        "scene.lights.l.type = point\nscene.lights.l.position = 1 0 0\n"
+        "scene.lights.l.transformation = 0 1 0 0 -1 0 0 0 0 0 1 0 0 0 5 1\n"
+    )
+    assert _light(load_scene_file(path)).position == pytest.approx((0.0, 1.0, 5.0), abs=1e-9)
+
+
+def test_a_world_begins_without_transform_at_all_times(tmp_path: Path) -> None:
+    head = 'ActiveTransform EndTime\nTranslate 0 0 1\nCamera "perspective"\nWorldBegin\n'
+    scene, losses = pbrt(tmp_path, 'Translate 3 0 0\nShape "sphere"\n', head)
+    assert scene.instances[0].track is None and scene.camera.track is not None and not losses
+    assert scene.instances[0].to_world[:3, 3].tolist() == [3.0, 0.0, 0.0]
+
+
+def test_the_world_is_a_coordinate_system(tmp_path: Path) -> None:
+    scene, losses = pbrt(tmp_path, 'Translate 3 0 0\nCoordSysTransform "world"\nShape "sphere"\n')
+    assert np.array_equal(scene.instances[0].to_world, np.eye(4)) and not losses
+
+
+@pytest.mark.parametrize(("head", "count"), [(HEAD, 1), (V4, 1)])
+def test_lamps_inside_objects_are_named(head: str, count: int, tmp_path: Path) -> None:
+    body = 'ObjectBegin "o"\nAreaLightSource "diffuse"\nShape "sphere"\nObjectEnd\n' + 'ObjectInstance "o"\n' * 2
+    scene, losses = pbrt(tmp_path, body, head)
+    assert len(scene.instances) == 2 and all(one.emission is not None for one in scene.instances)
+    assert sum("an area light inside an object" in loss for loss in losses) == count
+
+
+@pytest.mark.parametrize(("name", "lost"), [('"normal N" [ 0 0 1 ]', "N"), ('"float uv" [ 0 0 1 0 ]', "uv")])
+@pytest.mark.parametrize(
+    "mesh",
+    ['Shape "trianglemesh" "integer indices" [ 0 1 2 ]', 'Shape "bilinearmesh" "integer indices" [ 0 1 2 2 ]'],
+)
+def test_values_of_another_count_than_the_points_are_left_out(mesh: str, name: str, lost: str, tmp_path: Path) -> None:
+    scene, losses = pbrt(tmp_path, f'{mesh} "point P" [ 0 0 0 1 0 0 0 1 0 ] {name}\n')
+    (one,) = scene.instances
+    assert isinstance(one.shape, Mesh) and one.shape.normals is None and one.shape.uvs is None
+    assert any(f"{lost} of a mesh" in loss for loss in losses)
+
+
+def test_three_points_are_a_triangle(tmp_path: Path) -> None:
+    scene, losses = pbrt(tmp_path, 'Shape "trianglemesh" "point3 P" [ 0 0 0 1 0 0 0 1 0 ]\n', V4)
+    assert scene.instances[0].shape.faces.tolist() == [[0, 1, 2]] and not losses
+
+
+def test_point_lights_come_back_where_they_were(tmp_path: Path) -> None:
+    scene, _ = pbrt(tmp_path, POINT.format("point from"))
+    for name in ("b.pbrt", "b.lxs"):
+        save_scene_file(scene, tmp_path / name, report=LossReport())
+        assert _light(load_scene_file(tmp_path / name)).position == pytest.approx((1.0, 0.0, 5.0))
