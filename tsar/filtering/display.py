@@ -9,6 +9,7 @@ from torch import Tensor
 
 from tsar.filtering.records import NOTHING_KNOWN, VARIANCE_MAX, Estimates, Surfels
 from tsar.policies.resampling import double_width
+from tsar.roots import square_root
 
 
 def displayed(
@@ -40,14 +41,17 @@ def displayed(
 def smoothed(
     color: Float[Tensor, "3 h w"], variance: Float[Tensor, "1 h w"], roughness: Float[Tensor, "1 h w"]
 ) -> tuple[Float[Tensor, "3 h w"], Float[Tensor, "1 h w"]]:
-    """Picture and variance of its errors, over a pyramid of means.
+    """Picture and variance of its errors, over a pyramid of means of the square roots of colours.
+
+    Roots differ about as much as they look different, and variances are those of roots. Means of colours spread the
+    light of a lamp over its dark surroundings.
 
     Let ``s_l = g 2^l / 2`` at level ``l``. Upwards, a parent is the mean of its children, weighted with
     ``w = 1 / (P_l + s_l)``, and ``P_(l+1) = 1 / sum(w)``. Downwards, with ``J = P_l / (P_l + s_l)`` and the coarser
     level enlarged bilinearly to ``x', V'``, ``x = m_l + J (x' - m_l)`` and ``V = P_l + J² (V' - P_l - s_l)``. Where the
     number of rows or columns is odd, the last parent has fewer children.
     """
-    levels = [(color, variance, roughness)]
+    levels = [(square_root(color), variance, roughness)]
     while max(levels[-1][0].shape[1:]) > 1:
         color, variance, roughness = levels[-1]
         weight = 1.0 / (variance + _between(roughness, len(levels) - 1))
@@ -60,7 +64,7 @@ def smoothed(
         share = variance / (variance + between)
         shown = color + share * (_doubled(shown, color) - color)
         remaining = variance + share * share * (_doubled(remaining, color) - variance - between)
-    return shown, remaining
+    return shown * shown, remaining
 
 
 def _between(roughness: Float[Tensor, "1 h w"], level: int) -> Float[Tensor, "1 h w"]:

@@ -31,7 +31,7 @@ from tsar.response import initial_densities
 from tsar.selection import initial_history
 from tsar.types import Densities, Errors
 
-PIXEL_FLOPS = 435.0
+PIXEL_FLOPS = 440.0
 """Operations per output pixel and cycle, as a test counts them: aging, moving, errors, points and smoothing."""
 ELEMENT_FLOPS = 147.0
 """Operations of response, tiling and selection per element of the field. Source: Stephens 2011, table 7.1; a count of

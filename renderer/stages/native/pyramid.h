@@ -1,8 +1,8 @@
 // The picture of the estimates, over a pyramid of means, with the same bits as tsar/filtering/display.py.
 //
-// A level has five planes: red, green, blue, variance, roughness. On the way down, the picture and its remaining
-// variance replace colours and variance. For the finest level only the variance is stored; the rest is read and written
-// in place. Threads share its rows.
+// A level has five planes: red, green, blue, variance, roughness; colours are square roots. On the way down, the picture
+// and its remaining variance replace colours and variance. For the finest level only the variance is stored; the rest is
+// read and written in place, and its colours are no roots. Threads share its rows.
 #pragma once
 #include "lanes.h"
 
@@ -55,6 +55,9 @@ inline void vary(const Estimated& of, float seconds, int side, int width, int ro
     }
 }
 
+// A colour of the level as it is averaged.
+template <bool finest> inline float averaged(float color) { return finest ? __builtin_sqrtf(color) : color; }
+
 inline float mean4(const float* a, const float* b, int column) {
     return (((a[2 * column] + a[2 * column + 1]) + b[2 * column]) + b[2 * column + 1]) / 4.0f;
 }
@@ -62,6 +65,7 @@ inline float mean4(const float* a, const float* b, int column) {
 // A row of the coarser level, from `rows` (one or two) finer rows of the picture. `between` is half the distance
 // between pixels of the finer level, the factor from roughness to variance; `spare` has room for four rows. Beyond the
 // picture the weight is 0 and the roughness is that of the border.
+template <bool finest>
 inline void up(const Fine& fine, int side, int width, int rows, float between, int row, float* spare, float* coarse) {
     const int half = side / 2, quarter = half * half, count = side * side, start = 2 * row * side;
     const int columns = (width + 1) / 2;
@@ -81,7 +85,7 @@ inline void up(const Fine& fine, int side, int width, int rows, float between, i
     for (int plane = 0; plane < 3; ++plane) {
         const float* color = fine.color + plane * count + start;
         for (int k = 0; k < rows * side; k += side)
-            for (int i = k; i < k + width; ++i) weighted[i] = color[i] * weight[i];
+            for (int i = k; i < k + width; ++i) weighted[i] = averaged<finest>(color[i]) * weight[i];
         for (int i = 0; i < columns; ++i)
             to[plane * quarter + i] = 4.0f * mean4(weighted, weighted + side, i) / to[3 * quarter + i];
     }
@@ -99,7 +103,8 @@ inline void enlarge(const float* __restrict from, int half, float* __restrict to
 }
 
 // Two rows of the finer level, at which the picture has `width` and `height`, from one row of the coarser level and its
-// neighbours. `spare` has room for sixteen rows. Without `shown` the result replaces the finer level.
+// neighbours. `spare` has room for sixteen rows. The result of the finest level is shown; others replace their level.
+template <bool finest>
 inline void down(const float* coarse, int side, int width, int height, float between, int row, float* spare,
                  const Fine& fine, const Shown* shown) {
     const int half = side / 2, count = side * side, quarter = half * half, rows = (height + 1) / 2;
@@ -115,16 +120,20 @@ inline void down(const float* coarse, int side, int width, int height, float bet
         for (int plane = 0; plane < 3; ++plane) {
             const float *mid = spare + (3 * plane + 1) * side, *beside = second ? mid + side : mid - side;
             const float* own = fine.color + plane * count + start;
-            float* const to = shown ? found + plane * side : (float*)own;
-            for (int i = 0; i < width; ++i) to[i] = own[i] + share[i] * ((0.75f * mid[i] + 0.25f * beside[i]) - own[i]);
+            float* const to = finest ? found + plane * side : (float*)own;
+            for (int i = 0; i < width; ++i) {
+                const float mine = averaged<finest>(own[i]);
+                const float mixed = mine + share[i] * ((0.75f * mid[i] + 0.25f * beside[i]) - mine);
+                to[i] = finest ? mixed * mixed : mixed;
+            }
         }
         const float *mid = spare + 10 * side, *beside = second ? mid + side : mid - side;
-        float* const remaining = shown ? shown->remaining + start : fine.variance + start;
+        float* const remaining = finest ? shown->remaining + start : fine.variance + start;
         for (int i = 0; i < width; ++i) {
             const float wide = 0.75f * mid[i] + 0.25f * beside[i];
             remaining[i] = variance[i] + share[i] * share[i] * ((wide - variance[i]) - between * roughness[i]);
         }
-        for (int i = 0; shown && i < width; i += 16)
+        for (int i = 0; finest && i < width; i += 16)
             packets::store_joined(shown->color + 3 * (start + i), {packets::load<packets::f16>(found + i),
                                                                    packets::load<packets::f16>(found + side + i),
                                                                    packets::load<packets::f16>(found + 2 * side + i)});
@@ -137,14 +146,14 @@ inline void shrink(const Picture& picture, int side, float seconds, int first, i
         const int end = 2 * row + 2 < height ? 2 * row + 2 : height;
         for (int k = 2 * row; k < end; ++k)
             vary(picture.estimated, seconds, side, width, k, picture.fine.variance + k * side);
-        up(picture.fine, side, width, end - 2 * row, 0.5f, row, spare, picture.levels);
+        up<true>(picture.fine, side, width, end - 2 * row, 0.5f, row, spare, picture.levels);
     }
 }
 
 inline void show(const Picture& picture, int side, int first, int last, float* spare) {
     const int width = (int)picture.width, height = (int)picture.height;
     for (int row = first; row < last; ++row)
-        down(picture.levels, side, width, height, 0.5f, row, spare, picture.fine, &picture.shown);
+        down<true>(picture.levels, side, width, height, 0.5f, row, spare, picture.fine, &picture.shown);
 }
 
 // Computes and smooths the levels from the second finest on, whose planes are given; the picture has `width` and
@@ -161,8 +170,8 @@ inline void smooth(float* levels, int side, int width, int height, float* spare)
         float* const next = level + given::LEVEL_PLANES * wide * wide;
         const int columns = part(width, pixels), rows = part(height, pixels);
         for (int row = 0; row < (rows + 1) / 2; ++row)
-            up(planes(level, wide), wide, columns, rows - 2 * row < 2 ? 1 : 2, 0.5f * (float)(1 << number), row, spare,
-               next);
+            up<false>(planes(level, wide), wide, columns, rows - 2 * row < 2 ? 1 : 2, 0.5f * (float)(1 << number), row,
+                      spare, next);
         level = next;
     }
     for (int wide = 2; wide <= side; wide *= 2) {
@@ -170,7 +179,8 @@ inline void smooth(float* levels, int side, int width, int height, float* spare)
         float* const finer = level - given::LEVEL_PLANES * wide * wide;
         const int columns = part(width, side / wide), rows = part(height, side / wide);
         for (int row = 0; row < (rows + 1) / 2; ++row)
-            down(level, wide, columns, rows, 0.5f * (float)(1 << number), row, spare, planes(finer, wide), nullptr);
+            down<false>(level, wide, columns, rows, 0.5f * (float)(1 << number), row, spare, planes(finer, wide),
+                        nullptr);
         level = finer;
     }
 }

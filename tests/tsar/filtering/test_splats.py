@@ -81,4 +81,4 @@ def test_a_pixel_is_the_mean_of_the_points_around_it_by_distance_and_variance() 
         certain = replace(estimates, color=alternate, aged=aged, inverse=inverse)
         assert torch.allclose(drawn(certain, moving, depth)[0][:, :, 3::2], torch.tensor(own), atol=1e-2)
         still = drawn(certain, replace(moving, step=0.0 * at), depth)[0]
-        assert torch.allclose(still, alternate, atol=1e-2), "what stands still is drawn in its pixel alone"
+        assert torch.allclose(still, alternate, atol=2e-2), "what stands still is drawn in its pixel alone"

@@ -60,7 +60,7 @@ def test_a_region_of_nan_is_dark_at_worst(policy: str, kind: StagesName) -> None
 
     pictures = shown(policy, kind, spoiled(SCREEN, spoil), 0.02)
     assert bool(pictures.isfinite().all()) and float(pictures.min()) >= 0.0 and float(pictures.max()) <= GREY + 2e-3
-    assert float((pictures[-1, :, 48:] - GREY).abs().mean()) < 0.1
+    assert float((pictures[-1, :, 48:] - GREY).abs().mean()) < 0.2
 
 
 @pytest.mark.parametrize("value", [pytest.param(0.0, marks=pytest.mark.slow), 1e-30, 1e30])
