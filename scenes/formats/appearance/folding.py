@@ -19,10 +19,14 @@ from scenes.canonical import (
 )
 from scenes.formats.appearance.graphs import once_a_node
 from scenes.formats.appearance.spectra import grey, rgb
+from scenes.formats.losses import LossReport
 
 ValueChange = Callable[[np.ndarray], np.ndarray]
 Join = Callable[[np.ndarray, np.ndarray], np.ndarray]
 Pairs = Callable[[Texture, Texture], Texture | None]
+
+_ROUNDED = 1e-6
+"""Difference from a bound that rounding makes."""
 
 
 def folded(texture: Texture) -> Texture:
@@ -163,3 +167,13 @@ def _mean(texture: Texture, again: Callable[[Texture], Rgb]) -> Rgb:
         return rgb(np.multiply(again(texture.first), again(texture.second)))
     weights = 1.0 - texture.amount, texture.amount
     return rgb(weights[0] * np.array(again(texture.first)) + weights[1] * np.array(again(texture.second)))
+
+
+def within_one(value: Rgb, where: str, report: LossReport) -> Rgb:
+    """A reflectance for targets that refuse those outside of [0, 1], which is reported."""
+    if max(value) <= 1.0 and min(value) >= 0.0:
+        return value
+    beyond = max(value) if max(value) > 1.0 else min(value)
+    if not -_ROUNDED <= beyond <= 1.0 + _ROUNDED:
+        report.add(where, f"a reflectance of {beyond:.4g}", "one within 0 and 1")
+    return rgb(np.clip(value, 0.0, 1.0))

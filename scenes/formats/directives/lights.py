@@ -13,7 +13,7 @@ from scenes.canonical import DirectionalLight, EnvironmentLight, PointLight, Rgb
 from scenes.canonical.values import Matrix
 from scenes.formats.appearance.spectra import rgb
 from scenes.formats.directives.syntax import Parameters
-from scenes.formats.geometry.conventions import MAP_AXES
+from scenes.formats.geometry.conventions import MAP_AXES, turned_map
 from scenes.formats.geometry.transform_stack import TransformStack
 from scenes.formats.losses import LossReport
 
@@ -61,8 +61,7 @@ def even_environment(strength: Rgb) -> EnvironmentLight:
 
 def environment_map(image: NDArray[np.float32], placed: Matrix, strength: Rgb, path: Path) -> EnvironmentLight:
     """An environment map, rotated by ``placed``, with its radiance multiplied by ``strength``."""
-    turn = placed.copy()
-    turn[:3, 3] = 0.0
+    turn = turned_map(placed)
     if strength[0] == strength[1] == strength[2]:
         return EnvironmentLight(image, product(turn, MAP_AXES), strength[0], str(path))
     return EnvironmentLight((image * np.array(strength)).astype(np.float32), product(turn, MAP_AXES), 1.0, str(path))

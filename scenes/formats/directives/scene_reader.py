@@ -46,7 +46,7 @@ from scenes.formats.directives.shapes import UNMOVED, ShapeReader
 from scenes.formats.directives.surfaces import SurfaceFactory
 from scenes.formats.directives.syntax import Directive, Parameters, parameters_of
 from scenes.formats.directives.window import ScreenWindow, fitted, window_of
-from scenes.formats.geometry.conventions import FAR, duration_s
+from scenes.formats.geometry.conventions import FAR, duration_s, with_unit_axes
 from scenes.formats.geometry.curves import joined
 from scenes.formats.geometry.recognition import shape_of
 from scenes.formats.geometry.transform_stack import inverse, motion, moved_by, translation
@@ -290,6 +290,7 @@ def scene_of(reader: SceneReader, path: Path) -> Scene:
         camera = PerspectiveCamera(FORWARD, 90.0)
     elif reader.window is not None:
         camera = fitted(camera, reader.window, reader.film, reader.report)
+        camera = with_unit_axes(camera, reader.window.where, reader.report)
     parts = tuple(joined(reader.instances)), tuple(reader.lights), reader.film, reader.sampler, reader.integrator
     lasts, materials = duration_s(camera, reader.instances), dict(reader.names.materials)
     medium, name = reader.drawn(reader.medium), Path(path).stem

@@ -14,7 +14,7 @@ from scenes.canonical import (
     SceneError,
 )
 from scenes.formats.appearance.media import as_drawn_by, settled
-from scenes.formats.geometry.conventions import duration_s
+from scenes.formats.geometry.conventions import duration_s, with_unit_axes
 from scenes.formats.losses import LossReport
 from scenes.formats.mitsuba.media import MitsubaMedia
 from scenes.formats.mitsuba.modern import in_old_words, is_modern
@@ -205,6 +205,7 @@ def scene_of(reader: MitsubaReader, path: Path) -> Scene:
     if reader.camera is None:
         report.add(str(path), "no sensor", "one that sees the shapes along z")
         reader.camera = seeing_all(reader.instances)
+    reader.camera = with_unit_axes(reader.camera, str(path), report)
     parts = tuple(reader.instances), tuple(reader.lights.lights), reader.film, reader.sampler, reader.integrator
     lasts = duration_s(reader.camera, reader.instances)
     scene = Scene(reader.camera, *parts, medium=reader.medium, materials=dict(reader.materials), name=Path(path).stem,

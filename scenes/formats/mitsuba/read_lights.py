@@ -21,6 +21,8 @@ from scenes.canonical import (
 from scenes.canonical.values import Matrix
 from scenes.daylight import sun_at
 from scenes.formats.appearance.spectra import grey, rgb
+from scenes.formats.geometry.conventions import turned_map
+from scenes.formats.geometry.orientation import scales_evenly
 from scenes.formats.losses import LossReport
 from scenes.formats.mitsuba.properties import Properties
 from scenes.formats.text.scene_files import SceneFiles
@@ -50,6 +52,8 @@ class MitsubaLights:
             if any(child.tag in ("texture", "ref") for child in properties.rest):
                 self.report.add(properties.where, "a picture in a spot light", "none")
                 properties.asked.update(child.get("name") for child in properties.rest)
+            if not scales_evenly(matrix[:3, :3]):
+                self.report.add(properties.where, "a spot light that a transform stretches", "a round one")
             self.lights.append(SpotLight(*ends, properties.color("intensity", grey(1.0)), inner, outer, "linear"))
         elif kind in ("directional", "collimated"):
             direction = properties.vector("direction", rgb(matrix[:3, 2]))
@@ -58,16 +62,20 @@ class MitsubaLights:
             if kind == "collimated":
                 self.report.add(properties.where, "a beam of no width", "a parallel light")
             unit = rgb(direction / norm(direction))
-            self.lights.append(DirectionalLight(unit, properties.color("irradiance", grey(1.0))))
+            # Mitsuba does not shorten the axis of the transform (measured with 3.9)
+            bright = 1.0 if "direction" in properties else norm(direction)
+            irradiance = rgb(bright * np.array(properties.color("irradiance", grey(1.0))))
+            self.lights.append(DirectionalLight(unit, irradiance))
         elif kind == "constant":
             radiance = properties.color("radiance", grey(1.0))
             self.lights.append(EnvironmentLight(np.array([[list(radiance)]], np.float32)))
         elif kind == "envmap":
             name, scale = properties.text("filename", ""), properties.number("scale", 1.0)
             path = self.files.known(name, properties.where, self.report, f"the picture {name!r}", "even light")
-            matrix[:3, 3] = 0.0
+            if abs(norm(matrix[:3, 1]) - 1.0) > 1e-4:  # Mitsuba 3.9 looks up directions that are not of length 1
+                self.report.add(properties.where, "an environment map that its transform scales", "one of its own size")
             image = np.ones((1, 1, 3), np.float32) if path is None else loading.read_image(path)
-            self.lights.append(EnvironmentLight(image, matrix, scale, str(path or "")))
+            self.lights.append(EnvironmentLight(image, turned_map(matrix), scale, str(path or "")))
         elif kind in ("sun", "sky", "sunsky"):
             self._daylight(kind, properties, matrix)
         elif kind == "area":

@@ -12,7 +12,7 @@ from functools import cache
 
 from scenes.canonical import CheckerboardTexture, ConstantTexture, ImageTexture, Texture
 from scenes.canonical.values import Matrix, Rgb
-from scenes.formats.appearance.folding import folded, mean_of
+from scenes.formats.appearance.folding import folded, mean_of, within_one
 from scenes.formats.geometry.conventions import first_row_below
 from scenes.formats.losses import LossReport
 from scenes.formats.text.numbers import number, spaced
@@ -73,7 +73,8 @@ class ElementWriter:
             self._folded[id(texture)] = texture, folded(texture)
         texture = self._folded[id(texture)][1]
         if isinstance(texture, ConstantTexture):
-            self.color(parent, name, texture.value)
+            value = within_one(texture.value, name, self.report) if self.modern else texture.value
+            self.color(parent, name, value)
             return
         if isinstance(texture, ImageTexture):
             made = self.plugin("texture", "bitmap", parent, name=self.name(name))

@@ -30,9 +30,10 @@ from scenes.canonical import (
     Uber,
 )
 from scenes.canonical.textures import WHITE
+from scenes.canonical.values import Rgb
 from scenes.formats.appearance.coats import with_bounces
 from scenes.formats.appearance.facets import Facets
-from scenes.formats.appearance.folding import folded, mean_of
+from scenes.formats.appearance.folding import folded, mean_of, within_one
 from scenes.formats.appearance.glass import lose_rays
 from scenes.formats.appearance.mixtures import added_metal, dimmed, lobes_of
 from scenes.formats.appearance.spectra import grey
@@ -54,6 +55,11 @@ class PbrtV4SurfaceWriter(PbrtSurfaceWriter):
         kind = {"bilinear": "bilinear", "nearest": "point", "mipmap": "trilinear"}[texture.filter]
         more = f'"string filter" [ "{kind}" ] '
         return self.placed_image(file, texture, more, texture.uv_scale, texture.uv_offset)
+
+    def constant(self, name: str, value: Rgb, kind: Kind = "color") -> str:
+        """A constant parameter; PBRT v4 refuses reflectances above 1."""
+        bounded = kind == "color" and name not in ("eta", "k")
+        return super().constant(name, within_one(value, name, self.report) if bounded else value, kind)
 
     def texture_line(self, texture: Texture, kind: Kind) -> str:
         plain = folded(texture)

@@ -5,12 +5,14 @@ Sources: ``paramset.cpp``, ``api.cpp``, ``lights/point.cpp`` and ``shapes/triang
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 
 import numpy as np
 import pytest
+from PIL import Image
 
-from scenes.canonical import ConstantTexture, Matte, Mesh, PointLight
+from scenes.canonical import ConstantTexture, Matte, Mesh, OrthographicCamera, PerspectiveCamera, PointLight
 from scenes.formats.conversion import load_scene_file, save_scene_file
 from scenes.formats.losses import LossReport
 from tests.scenes.formats.files import HEAD, pbrt
@@ -114,3 +116,62 @@ def test_point_lights_come_back_where_they_were(tmp_path: Path) -> None:
     for name in ("b.pbrt", "b.lxs"):
         save_scene_file(scene, tmp_path / name, report=LossReport())
         assert _light(load_scene_file(tmp_path / name)).position == pytest.approx((1.0, 0.0, 5.0))
+
+
+LOOK = "LookAt 1 2 6 0 0 0 0 1 0\n"
+WIDE = math.degrees(2.0 * math.atan(2.0 * math.tan(math.radians(20.0))))
+
+
+@pytest.mark.parametrize(
+    ("scale", "lens", "focus", "fov"),
+    [
+        ("2 2 2", 0.05, 0.5, 40.0),
+        ("-2 2 2", 0.05, 0.5, 40.0),
+        ("1 1 2", 0.1, 0.5, WIDE),
+        (".5 .5 1", 0.2, 1.0, WIDE),
+    ],
+)
+def test_a_camera_with_a_scale_is_one_without(
+    scale: str, lens: float, focus: float, fov: float, tmp_path: Path
+) -> None:
+    camera = 'Camera "perspective" "float fov" 40 "float lensradius" .1 "float focaldistance" 1\nWorldBegin\n'
+    scene, losses = pbrt(tmp_path, 'Shape "sphere"\n', f"Scale {scale}\n{LOOK}{camera}")
+    assert isinstance(scene.camera, PerspectiveCamera) and not losses
+    axes = scene.camera.to_world[:3, :3]
+    assert np.allclose(axes.T @ axes, np.eye(3))
+    found = scene.camera.lens_radius, scene.camera.focal_distance, scene.camera.fov_deg
+    assert found == pytest.approx((lens, focus, fov), abs=1e-3)
+
+
+def test_a_camera_that_stretches_is_named(tmp_path: Path) -> None:
+    _, losses = pbrt(tmp_path, 'Shape "sphere"\n', f'Scale 2 1 1\n{LOOK}Camera "perspective"\nWorldBegin\n')
+    assert any("stretches its picture" in loss for loss in losses)
+
+
+@pytest.mark.parametrize("to", ["pbrt", "luxrender", "mitsuba3", "gltf", "usd"])
+def test_the_scale_of_a_parallel_view_is_the_size_of_its_picture(to: str, tmp_path: Path) -> None:
+    film = 'Film "image" "integer xresolution" 64 "integer yresolution" 64\n'
+    head = f'Scale .25 .25 .25\n{LOOK}Camera "orthographic"\n{film}'
+    scene, _ = pbrt(tmp_path, 'Shape "sphere"\n', head + "WorldBegin\n")
+    ending = {"pbrt": "pbrt", "luxrender": "lxs", "mitsuba3": "xml", "gltf": "gltf", "usd": "usda"}[to]
+    path = tmp_path / f"b.{ending}"
+    save_scene_file(scene, path, to, LossReport())
+    for camera in (scene.camera, load_scene_file(path).camera):
+        assert isinstance(camera, OrthographicCamera) and camera.half_width == pytest.approx(4.0)
+
+
+@pytest.mark.parametrize(("head", "name"), [(HEAD, "mapname"), (V4, "filename")])
+def test_an_environment_map_has_no_size(head: str, name: str, tmp_path: Path) -> None:
+    Image.fromarray(np.zeros((4, 4, 3), np.uint8)).save(tmp_path / "a.png")
+    light = f'Rotate 30 0 0 1\nLightSource "infinite" "string {name}" "a.png"\n'
+    found = [pbrt(tmp_path, scale + light, head)[0].lights[0].to_world for scale in ("", "Scale 5 5 5\n")]
+    assert np.allclose(*found)
+
+
+@pytest.mark.parametrize("to", ["pbrt4", "mitsuba3"])
+def test_reflectances_above_1_are_1_where_the_target_refuses_them(to: str, tmp_path: Path) -> None:
+    scene, _ = pbrt(tmp_path, 'Material "matte" "rgb Kd" [ 1.2 .5 .25 ]\nShape "sphere"\n')
+    report, path = LossReport(), tmp_path / ("b.xml" if to == "mitsuba3" else "b.pbrt")
+    save_scene_file(scene, path, to, report)
+    assert load_scene_file(path).instances[0].material == Matte(ConstantTexture((1.0, 0.5, 0.25)))
+    assert [loss.what for loss in report.losses if loss.picture] == ["a reflectance of 1.2"]
