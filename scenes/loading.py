@@ -124,8 +124,9 @@ def _image(path: Path, state: FileState | None) -> tuple[Pixels, bool]:
         )
     except Exception as error:  # decoders raise arbitrary exceptions on broken files
         raise SceneError(f"texture {path}: cannot be read: {one_line(error)}") from error
-    if pixels.ndim != 3 or pixels.shape[2] != 3 or not np.isfinite(pixels).all():
-        raise SceneError(f"texture {path}: expected finite RGB pixels (h, w, 3), got shape {pixels.shape}")
+    bad = int((~np.isfinite(pixels)).any(axis=-1).sum())
+    if bad:
+        raise SceneError(f"texture {path}: expected finite values, got {bad} pixels without")
     pixels.flags.writeable = False
     return pixels, linear
 

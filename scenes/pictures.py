@@ -7,7 +7,7 @@ bits; Pillow reads other files.
 from __future__ import annotations
 
 import warnings
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, BinaryIO, TypeVar
@@ -154,7 +154,7 @@ def _three(pixels: np.ndarray) -> np.ndarray:
 
 
 def _opened(path: Path) -> ImageBuf:
-    """An image whose values are read on demand.
+    """An image whose values are read on demand; of several parts of a file the first one that has colours.
 
     Raises:
         ValueError: the file cannot be read.
@@ -165,9 +165,71 @@ def _opened(path: Path) -> ImageBuf:
     oiio.attribute("exr_threads", -1)
     hints = oiio.ImageSpec()
     hints.attribute("oiio:UnassociatedAlpha", 1)  # colours are not multiplied by alpha
-    image = oiio.ImageBuf(str(path), 0, 0, hints)
+    first = oiio.ImageBuf(str(path), 0, 0, hints)
+    _require_read(first)
+    others = range(1, first.nsubimages) if _is_exr(first) and not _has_colours(first) else ()
+    parts = (oiio.ImageBuf(str(path), part, 0, hints) for part in others)
+    return next((part for part in parts if _has_colours(part)), first)
+
+
+def _is_exr(image: ImageBuf) -> bool:
+    return image.file_format_name == "openexr"
+
+
+def _has_colours(image: ImageBuf) -> bool:
+    return red_green_blue(image.spec().channelnames) is not None
+
+
+def red_green_blue(names: Sequence[str]) -> tuple[int, int, int] | None:
+    """Indices of red, green and blue by the names of channels: those without a layer, or those of the first layer,
+    such as ``ViewLayer.Combined.R``, that has all three; None if there are none."""
+    places = {name.lower(): place for place, name in enumerate(names)}
+    layers = dict.fromkeys(("", *(name.lower().rpartition(".")[0] for name in names)))
+    for layer in layers:
+        for colours in (("r", "g", "b"), ("red", "green", "blue")):
+            full = [f"{layer}.{one}".lstrip(".") for one in colours]
+            if all(one in places for one in full):
+                return places[full[0]], places[full[1]], places[full[2]]
+    return None
+
+
+def _colours_of(image: ImageBuf) -> tuple[int, ...]:
+    """Indices of the channels of an image that are its colours, one if it is grey.
+
+    Raises:
+        ValueError: the channels are neither colours nor grey.
+    """
+    spec = image.spec()
+    found = red_green_blue(spec.channelnames)
+    if found is not None:
+        return found
+    layer = spec.channelnames[0].rpartition(".")[0]
+    channels = [place for place, name in enumerate(spec.channelnames) if name.rpartition(".")[0] == layer]
+    chroma = _is_exr(image) and any(name.rpartition(".")[2] in ("RY", "BY") for name in spec.channelnames)
+    if chroma or (len(channels) == 2 and spec.alpha_channel not in channels):
+        raise ValueError(f"expected red, green and blue, or grey, got {' and '.join(spec.channelnames)}")
+    return tuple(channels[:3]) if len(channels) >= 3 else (channels[0],)
+
+
+def _size_of(image: ImageBuf) -> tuple[int, int]:
+    """Width and height of a picture: those of the display window in an OpenEXR file."""
+    spec = image.spec()
+    return (spec.full_width, spec.full_height) if _is_exr(image) else (spec.width, spec.height)
+
+
+def _values(image: ImageBuf, kind: object) -> np.ndarray:
+    """All channels ``(h, w, channels)`` that were read, upright; 0 where the data of an OpenEXR file do not cover its
+    display window. The orientation of a TIFF file is part of its format, that of metadata is ignored as in JPEG."""
+    import OpenImageIO as oiio
+
+    if _is_exr(image):
+        pixels = image.get_pixels(kind, image.spec().roi_full)
+    else:
+        upright = oiio.ImageBufAlgo.reorient(image) if image.file_format_name == "tiff" else image
+        pixels = upright.get_pixels(kind)
     _require_read(image)
-    return image
+    assert pixels is not None
+    return pixels
 
 
 def _wide(path: Path) -> Pixels | NDArray[np.uint16] | None:
@@ -178,15 +240,18 @@ def _wide(path: Path) -> Pixels | NDArray[np.uint16] | None:
     spec = image.spec()
     if spec.format.basetype in (oiio.UINT8, oiio.INT8):
         return None
-    _require_size(spec.width, spec.height)
-    if spec.nchannels == 2 and spec.alpha_channel < 0:
-        raise ValueError(f"expected red, green and blue, or grey, got {' and '.join(spec.channelnames)}")
-    image.read(0, 0, 0, min(spec.nchannels, 3), True, oiio.TypeUnknown)
+    _require_size(*_size_of(image))
+    colours = _colours_of(image)
+    whole = spec.channelformat(colours[0]).basetype == oiio.UINT and _is_exr(image)  # numbers, not fractions
+    linear = spec.format.basetype in (oiio.HALF, oiio.FLOAT, oiio.DOUBLE) or whole
+    first = min(colours)
+    image.read(image.subimage, 0, first, max(colours) + 1, True, oiio.UINT if whole else oiio.TypeUnknown)
     _require_read(image)
-    linear = spec.format.basetype in (oiio.HALF, oiio.FLOAT, oiio.DOUBLE)
-    pixels = oiio.ImageBufAlgo.reorient(image).get_pixels(oiio.FLOAT if linear else oiio.UINT16)
-    assert pixels is not None
-    return _three(pixels)
+    pixels = _values(image, oiio.UINT if whole else oiio.FLOAT if linear else oiio.UINT16)
+    pixels = pixels[..., [one - first for one in colours]]
+    if not linear and spec.getattribute("tiff:PhotometricInterpretation") == 0:  # white is zero
+        pixels = np.uint16(65535) - pixels
+    return _three(pixels.astype(np.float32) if whole else pixels)
 
 
 def _wide_alpha(path: Path) -> Pixels | None:
@@ -197,12 +262,10 @@ def _wide_alpha(path: Path) -> Pixels | None:
     spec = image.spec()
     if spec.format.basetype in (oiio.UINT8, oiio.INT8):
         return None
-    _require_size(spec.width, spec.height)
+    _require_size(*_size_of(image))
+    pixels = _values(image, oiio.FLOAT)  # integers as fractions
     if spec.alpha_channel < 0:
-        return np.ones((spec.height, spec.width), np.float32)
-    pixels = oiio.ImageBufAlgo.reorient(image).get_pixels(oiio.FLOAT)  # integers as fractions
-    _require_read(image)
-    assert pixels is not None
+        return np.ones(pixels.shape[:2], np.float32)
     alpha = pixels[..., spec.alpha_channel]
     if not np.isfinite(alpha).all():
         raise ValueError("expected finite opacities")

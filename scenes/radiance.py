@@ -31,6 +31,8 @@ class RadianceHeader:
         columns: whether the file has columns in place of rows.
         ordered: whether rows go down and their pixels to the right; for columns, whether these go to the right and
             their pixels down.
+        is_plain: whether the library reads the file as it is: rows go down, their pixels to the right, values are red,
+            green and blue, and the header names its format.
         plain: the header with the same number of pixels whose rows go down and whose pixels go to the right.
         start: number of bytes before the pixels.
     """
@@ -39,13 +41,9 @@ class RadianceHeader:
     chromaticities: tuple[float, ...] | None
     columns: bool
     ordered: tuple[bool, bool]
+    is_plain: bool
     plain: bytes
     start: int
-
-    @property
-    def is_plain(self) -> bool:
-        """Whether rows go down, their pixels to the right, and values are red, green and blue."""
-        return not self.columns and self.ordered == (True, True) and self.chromaticities != XYZ
 
     def upright(self, pixels: NDArray[np.float32]) -> NDArray[np.float32]:
         """The picture ``(h, w, 3)`` of the values in the file, its first row at the top."""
@@ -66,13 +64,14 @@ def header_of(path: Path) -> RadianceHeader | None:
     size = _RESOLUTION.match(rest.partition(b"\n")[0])
     pairs = [line.partition(b"=")[::2] for line in head.split(b"\n")]
     kinds = [_FORMATS.get(value.strip()) for name, value in pairs if name.strip() == b"FORMAT"]
-    if not content.startswith(b"#?") or not blank or size is None or not kinds or kinds[-1] is None:
+    if not content.startswith(b"#?") or not blank or size is None or None in kinds[-1:]:
         return None
-    divisor, chromaticities = np.ones(3), XYZ if kinds[-1] else None
+    is_xyz = bool(kinds and kinds[-1])  # red, green and blue if no format is named
+    divisor, chromaticities = np.ones(3), XYZ if is_xyz else None
     for name, value in pairs:
         if name in (b"EXPOSURE", b"COLORCORR"):
             divisor *= _numbers(name, value, 1 if name == b"EXPOSURE" else 3)
-        elif name == b"PRIMARIES" and not kinds[-1]:
+        elif name == b"PRIMARIES" and not is_xyz:
             chromaticities = tuple(_numbers(name, value, 8).tolist())
     if not ((divisor >= _EXPOSURES[0]) & (divisor <= _EXPOSURES[1])).all():
         least, most = _EXPOSURES
@@ -86,7 +85,8 @@ def header_of(path: Path) -> RadianceHeader | None:
     plain = b"#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n-Y " + count + b" +X " + length + b"\n"
     red, green, blue = divisor.tolist()
     start = len(head) + len(blank) + len(rest.partition(b"\n")[0]) + 1
-    return RadianceHeader((red, green, blue), chromaticities, axis == b"X", ordered, plain, start)
+    is_plain = axis == b"Y" and ordered == (True, True) and bool(kinds) and not is_xyz
+    return RadianceHeader((red, green, blue), chromaticities, axis == b"X", ordered, is_plain, plain, start)
 
 
 def _numbers(name: bytes, value: bytes, count: int) -> NDArray[np.float64]:

@@ -179,13 +179,13 @@ def test_16_bits_with_colour_or_alpha(channels: int, tmp_path: Path) -> None:
     assert read_image(path) == pytest.approx(np.full((2, 3, 3), decoded(32700 / 65535)), rel=1e-5)
 
 
-def png_of_16_bits(values: np.ndarray, color_type: int, transparent: bytes) -> bytes:
-    def chunk(name: bytes, body: bytes) -> bytes:
-        return struct.pack(">I", len(body)) + name + body + struct.pack(">I", zlib.crc32(name + body))
+def png_of_16_bits(values: np.ndarray, color_type: int, transparent: bytes, name: bytes = b"tRNS") -> bytes:
+    def chunk(kind: bytes, body: bytes) -> bytes:
+        return struct.pack(">I", len(body)) + kind + body + struct.pack(">I", zlib.crc32(kind + body))
 
     header = struct.pack(">IIBBBBB", values.shape[1], values.shape[0], 16, color_type, 0, 0, 0)
     rows = zlib.compress(b"".join(b"\0" + row.astype(">u2").tobytes() for row in values))
-    parts = (b"IHDR", header), (b"tRNS", transparent), (b"IDAT", rows), (b"IEND", b"")
+    parts = (b"IHDR", header), (name, transparent), (b"IDAT", rows), (b"IEND", b"")
     return b"\x89PNG\r\n\x1a\n" + b"".join(chunk(*part) for part in parts)
 
 
@@ -215,3 +215,19 @@ def test_alpha_of_openexr_and_radiance(tmp_path: Path) -> None:
         read_alpha(tmp_path / "broken.exr")
     (tmp_path / "a.hdr").write_bytes(radiance(bytes([128, 64, 32, 129] * 2), 2, 1))
     assert read_alpha(tmp_path / "a.hdr").tolist() == [[1.0, 1.0]]
+
+
+@pytest.mark.parametrize("bits", [8, 16])
+def test_how_a_camera_was_held_does_not_turn_a_png(bits: int, tmp_path: Path) -> None:
+    """Texture coordinates mean the pixels as they are stored, as in JPEG."""
+    held = b"MM\0*\0\0\0\x08" + struct.pack(">HHHIHHI", 1, 0x112, 3, 1, 6, 0, 0)
+    values = np.arange(18).reshape(2, 3, 3)
+    content = png_of_16_bits(values, 2, held, b"eXIf")
+    if bits == 8:
+        exif = Image.Exif()
+        exif.load(b"Exif\0\0" + held)
+        stream = io.BytesIO()
+        Image.fromarray(values.astype(np.uint8)).save(stream, "png", exif=exif)
+        content = stream.getvalue()
+    (tmp_path / "a.png").write_bytes(content)
+    np.testing.assert_array_equal(pictures.decoded(tmp_path / "a.png"), values)
