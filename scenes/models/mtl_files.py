@@ -38,7 +38,7 @@ from scenes.formats.appearance.spectra import rgb
 from scenes.formats.losses import LossReport
 from scenes.loading import read_alpha, read_image, read_values
 from scenes.models.phong_of_parts import EXPONENT_MAX, diffuse_share, glowing, metallic_rough, scaled, seen_through
-from scenes.models.sources import Sources
+from scenes.models.sources import Sources, joined_lines
 from scenes.pictures import Pixels
 
 _FIXED = {"-blendu": 1, "-blendv": 1, "-cc": 1, "-clamp": 1, "-mm": 2, "-texres": 1, "-bm": 1, "-imfchan": 1,
@@ -85,8 +85,8 @@ def entries(text: str) -> dict[str, _Entry]:
     """Materials of a library by name; of several with one name the first is used."""
     found: dict[str, _Entry] = {}
     entry = None
-    for line in text.replace("\\\n", " ").splitlines():
-        words = [] if line.lstrip().startswith("#") else line.split(maxsplit=1)
+    for line in joined_lines(text).splitlines():
+        words = line.split(maxsplit=1)
         if len(words) == 2 and words[0].lower() == "newmtl":
             entry = _Entry()
             found.setdefault(words[1].strip(), entry)

@@ -22,7 +22,7 @@ from scenes.loading import decode_srgb
 from scenes.models.mtl_files import entries, material_of
 from scenes.models.plain_files import GREY
 from scenes.models.smoothing import corner_normals, with_corners
-from scenes.models.sources import Sources, text_of
+from scenes.models.sources import Sources, joined_lines, text_of
 from scenes.models.vertex_colours import coloured
 
 _NAMED = ("usemtl", "mtllib")  # whose names may contain a number sign
@@ -85,7 +85,7 @@ def read_obj(sources: Sources, report: LossReport, facets: bool = False) -> tupl
 def _parsed(text: str) -> _File:
     file, group, smoothing = _File(), None, 0
     name = ""
-    for number, line in enumerate(text.replace("\\\n", " ").replace("\\\r\n", " ").splitlines(), start=1):
+    for number, line in enumerate(joined_lines(text).splitlines(), start=1):
         keyword, rest = (*line.split(maxsplit=1), "", "")[:2]
         if "#" in rest and keyword not in _NAMED:
             rest = rest.partition("#")[0]

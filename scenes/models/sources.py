@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import codecs
+import re
 from pathlib import Path
 from typing import Any
 from urllib.parse import unquote
@@ -12,6 +13,8 @@ from scenes.formats.losses import LossReport
 from scenes.loading import FileState, state_of
 
 _MARKS = ((codecs.BOM_UTF8, "utf-8-sig"), (codecs.BOM_UTF16_LE, "utf-16"), (codecs.BOM_UTF16_BE, "utf-16"))
+
+_COMMENT_OR_JOINT = re.compile(r"^[ \t]*#[^\r\n]*|\\[ \t]*\r?\n", re.MULTILINE)
 
 
 class Sources:
@@ -84,3 +87,9 @@ def text_of(path: Path) -> str:
         return content.decode("utf-8")
     except UnicodeDecodeError:
         return content.decode("cp1252", errors="replace")
+
+
+def joined_lines(text: str) -> str:
+    """The text of an OBJ file or a material library, in which a line that ends with a backslash goes on in the next
+    one; blanks may follow the backslash. Whole lines of comment are left out, since theirs may end a path."""
+    return _COMMENT_OR_JOINT.sub(lambda found: " " if found[0].startswith("\\") else "", text)

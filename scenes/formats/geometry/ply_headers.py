@@ -64,3 +64,12 @@ def header_of(content: bytes, name: str) -> tuple[str, list[Element], memoryview
 
 def _with(element: Element, added: tuple[str, str, str]) -> Element:
     return Element(element.name, element.count, (*element.properties, added))
+
+
+def texture_of(content: bytes) -> str:
+    """The name of the picture that MeshLab writes as a comment into a header; empty if there is none."""
+    for line in content[: max(content.find(b"end_header", 0, 1 << 16), 0)].decode("utf-8", "replace").splitlines():
+        words = line.split(maxsplit=2)
+        if len(words) == 3 and words[:2] == ["comment", "TextureFile"]:
+            return words[2].strip()
+    return ""
