@@ -19,7 +19,7 @@ from PIL import Image
 from scenes.radiance import RadianceHeader, header_of
 
 if TYPE_CHECKING:
-    from OpenImageIO import ImageBuf
+    from OpenImageIO import BASETYPE, ImageBuf
 
 Pixels = NDArray[np.float32]
 _Found = TypeVar("_Found")
@@ -217,7 +217,7 @@ def _size_of(image: ImageBuf) -> tuple[int, int]:
     return (spec.full_width, spec.full_height) if _is_exr(image) else (spec.width, spec.height)
 
 
-def _values(image: ImageBuf, kind: object) -> np.ndarray:
+def _values(image: ImageBuf, kind: BASETYPE) -> np.ndarray:
     """All channels ``(h, w, channels)`` that were read, upright; 0 where the data of an OpenEXR file do not cover its
     display window. The orientation of a TIFF file is part of its format, that of metadata is ignored as in JPEG."""
     import OpenImageIO as oiio
