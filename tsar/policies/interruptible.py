@@ -35,7 +35,7 @@ from tsar.clock import StageTimer
 from tsar.config import TsarConfig
 from tsar.policies import displacement, refinement
 from tsar.policies.refinement import Level, mean
-from tsar.policies.scatter import generator, pixel_colors, pull_push
+from tsar.policies.scatter import filled, generator, pixel_colors
 from tsar.policy import Moment, Picture, Policy, Price, Setting, require_square
 from tsar.roots import GOLDEN_2D, encoded
 from tsar.types import FrameletBatch, SampleBatch, SampleMap
@@ -150,13 +150,13 @@ class Interruptible(Policy[Buffers]):
 
     @property
     def price(self) -> Price:
-        """Besides refinement, per pixel: image 75 (pyramid up 20 and down 26, of three channels, and means 3, times
-        4/3); and displacement, for back and front buffer. Per sample: replacement of non-finite values 6, sums 8,
+        """Besides refinement, per pixel: image 84 (pyramid up 20 and down 26, of three channels, and means 3, times
+        4/3, and roots 9); and displacement, for back and front buffer. Per sample: replacement of non-finite values 6, sums 8,
         encoding and calibration 20.
         """
         return Price(
             int(self.config.budget),
-            pixel_flops=refinement.PIXEL_FLOPS + 75 + 2 * displacement.PIXEL_FLOPS,
+            pixel_flops=refinement.PIXEL_FLOPS + 84 + 2 * displacement.PIXEL_FLOPS,
             sample_flops=34,
         )
 
@@ -271,7 +271,7 @@ def _seen(frame: Frame, calibration: float, samples: int, config: TsarConfig) ->
     """The frame as a picture: means of the pixels, with empty ones filled from coarser levels."""
     side = config.resolution_px
     color, count = frame.color.T.reshape(3, side, side), frame.count.reshape(side, side)
-    image = pull_push(color / count.clamp(min=1.0), (count > 0).to(torch.float32)[None])
+    image = filled(color / count.clamp(min=1.0), (count > 0).to(torch.float32)[None])
     tree = refinement.levels(color, count)
     error = refinement.remaining(tree, calibration)
     return View(frame, image.permute(1, 2, 0).contiguous(), error, mean(error), tree, samples)
