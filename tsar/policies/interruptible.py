@@ -151,8 +151,8 @@ class Interruptible(Policy[Buffers]):
     @property
     def price(self) -> Price:
         """Besides refinement, per pixel: image 84 (pyramid up 20 and down 26, of three channels, and means 3, times
-        4/3, and roots 9); and displacement, for back and front buffer. Per sample: replacement of non-finite values 6, sums 8,
-        encoding and calibration 20.
+        4/3, and roots 9); and displacement, for back and front buffer. Per sample: replacement of non-finite values 6,
+        sums 8, encoding and calibration 20.
         """
         return Price(
             int(self.config.budget),

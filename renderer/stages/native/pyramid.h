@@ -106,7 +106,7 @@ inline void enlarge(const float* __restrict from, int half, float* __restrict to
 // neighbours. `spare` has room for sixteen rows. The result of the finest level is shown; others replace their level.
 template <bool finest>
 inline void down(const float* coarse, int side, int width, int height, float between, int row, float* spare,
-                 const Fine& fine, const Shown* shown) {
+                 const Fine& fine, const Shown& shown) {
     const int half = side / 2, count = side * side, quarter = half * half, rows = (height + 1) / 2;
     const int near[3] = {row > 0 ? row - 1 : 0, row, row + 1 < rows ? row + 1 : row};
     for (int plane = 0; plane < 4; ++plane)
@@ -128,15 +128,15 @@ inline void down(const float* coarse, int side, int width, int height, float bet
             }
         }
         const float *mid = spare + 10 * side, *beside = second ? mid + side : mid - side;
-        float* const remaining = finest ? shown->remaining + start : fine.variance + start;
+        float* const remaining = finest ? shown.remaining + start : fine.variance + start;
         for (int i = 0; i < width; ++i) {
             const float wide = 0.75f * mid[i] + 0.25f * beside[i];
             remaining[i] = variance[i] + share[i] * share[i] * ((wide - variance[i]) - between * roughness[i]);
         }
         for (int i = 0; finest && i < width; i += 16)
-            packets::store_joined(shown->color + 3 * (start + i), {packets::load<packets::f16>(found + i),
-                                                                   packets::load<packets::f16>(found + side + i),
-                                                                   packets::load<packets::f16>(found + 2 * side + i)});
+            packets::store_joined(shown.color + 3 * (start + i), {packets::load<packets::f16>(found + i),
+                                                                  packets::load<packets::f16>(found + side + i),
+                                                                  packets::load<packets::f16>(found + 2 * side + i)});
     }
 }
 
@@ -153,7 +153,7 @@ inline void shrink(const Picture& picture, int side, float seconds, int first, i
 inline void show(const Picture& picture, int side, int first, int last, float* spare) {
     const int width = (int)picture.width, height = (int)picture.height;
     for (int row = first; row < last; ++row)
-        down<true>(picture.levels, side, width, height, 0.5f, row, spare, picture.fine, &picture.shown);
+        down<true>(picture.levels, side, width, height, 0.5f, row, spare, picture.fine, picture.shown);
 }
 
 // Computes and smooths the levels from the second finest on, whose planes are given; the picture has `width` and
@@ -180,7 +180,7 @@ inline void smooth(float* levels, int side, int width, int height, float* spare)
         const int columns = part(width, side / wide), rows = part(height, side / wide);
         for (int row = 0; row < (rows + 1) / 2; ++row)
             down<false>(level, wide, columns, rows, 0.5f * (float)(1 << number), row, spare, planes(finer, wide),
-                        nullptr);
+                        Shown{});
         level = finer;
     }
 }

@@ -1,5 +1,7 @@
 """What the benchmark says about peers that it lacks."""
 
+import inspect
+import sys
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -12,6 +14,13 @@ from analysis.bench.rows import Row
 from analysis.command.progress import Bars
 
 
+def test_every_group_that_asks_a_peer_is_listed() -> None:
+    uses = {"embreex": "analysis.bench.embree", "mitsuba": "from analysis.bench import mitsuba", "pywt": "import pywt"}
+    for module, words in uses.items():
+        sources = {name: inspect.getsource(sys.modules[group.__module__]) for name, group in run.MEASURED_BY.items()}
+        assert {name for name, source in sources.items() if words in source} == set(WANTED_BY[module])
+
+
 def test_nothing_is_said_of_groups_without_peers() -> None:
     assert missing_peers([name for name in GROUPS if not any(name in groups for groups in WANTED_BY.values())]) == []
 
@@ -20,7 +29,7 @@ def test_each_missing_peer_is_named_with_what_installs_it(monkeypatch: pytest.Mo
     monkeypatch.setattr(embree, "missing", lambda: "embreex is not installed")
     monkeypatch.setattr(mitsuba, "installed", lambda name: True)
     monkeypatch.setattr(mitsuba, "find_llvm", lambda: None)
-    monkeypatch.setattr(peers, "installed", lambda name: False)
+    monkeypatch.setattr(peers, "installed", lambda name: name == "mitsuba")
     lines = missing_peers(GROUPS)
     assert [line.partition(":")[0] for line in lines] == [
         "no figures of Embree", "no figures of Mitsuba's llvm_ad_rgb", "no figures of PyWavelets", "Packages",
