@@ -109,8 +109,8 @@ def test_the_losses_of_holes_and_panes_are_those_of_luxcore(tmp_path: Path) -> N
     for side, wanted in ((1.0, 1.04), (-1.0, 1.0 - 0.04 * (1.0 + 0.96**2))):
         pane = furnace([Glass(thin=True)])
         turned = replace(pane.instances[0], to_world=np.diag([0.5, 0.5 * side, side, 1.0]))
-        found = drawn(replace(pane, instances=(turned,)), "luxcore", tmp_path, 16, 256)[4:12, 4:12].mean()
-        assert found == pytest.approx(wanted, abs=0.015)
+        found = drawn(replace(pane, instances=(turned,)), "luxcore", tmp_path, 16, 4096)[4:12, 4:12].mean()
+        assert found == pytest.approx(wanted, abs=0.005)
     report = LossReport()
     save_scene_file(pane, tmp_path / "a.lxs", None, report)
     assert [loss.became for loss in report.losses if loss.what == "a pane"] == [
