@@ -16,7 +16,11 @@ class ConfigError(ValueError):
 def require(condition: bool, name: str, expected: str, got: object) -> None:
     """Raise :class:`ConfigError` unless the condition holds."""
     if not condition:
-        raise ConfigError(f"{name}: expected {expected}, got {str(got) if isinstance(got, PurePath) else got!r}")
+        raise ConfigError(f"{name}: expected {expected}, got {_in_words(got)}")
+
+
+def _in_words(got: object) -> str:
+    return "none" if got == () else str(got) if isinstance(got, PurePath) else repr(got)
 
 
 Record = TypeVar("Record")
@@ -38,7 +42,8 @@ def closed_choices(place: str = "") -> Callable[[type[Record]], type[Record]]:
             for name, many, choices in _choices(type(self)):
                 value = getattr(self, name)
                 ok = all(item in choices for item in value) if many else value in choices
-                require(ok, place + name, f"{'some' if many else 'one'} of {', '.join(map(str, choices))}", value)
+                named = ", ".join(str(choice) for choice in choices if choice is not None)
+                require(ok, place + name, f"{'some' if many else 'one'} of {named}", value)
             if own is not None:
                 own(self)
 

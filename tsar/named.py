@@ -25,7 +25,8 @@ def not_among(name: object, known: Iterable[str]) -> str:
     names = [name for name in known if name]  # an empty one stands for none
     near = difflib.get_close_matches(str(name), names, n=1)
     hint = f" (nearest: {near[0]})" if near else ""
-    return f"expected one of {', '.join(names)}, got {name!r}{hint}"
+    quoted = any("," in name or " " in name for name in names)  # as they are typed, so that their ends can be seen
+    return f"expected one of {', '.join(repr(name) if quoted else name for name in names)}, got {name!r}{hint}"
 
 
 def require_known(name: str, field: str, known: Iterable[str]) -> None:

@@ -9,7 +9,9 @@ from typing import Annotated, Literal
 import tyro
 
 from analysis.command import limits
+from analysis.study.asked import require_inputs
 from tsar.config import closed_choices, require
+from tsar.named import require_known
 
 GROUPS = (
     "coherent",
@@ -77,7 +79,8 @@ class BenchOptions:
 
     def __post_init__(self) -> None:
         for name in self.groups:
-            require(name in GROUPS, "only", f"one of {', '.join(GROUPS)}", name)
+            require_known(name, "only", GROUPS)
+        require_inputs(self.scenes, "scenes")
         limited = self.isa == "native" or set(self.groups) <= set(ON_ANY_ISA)
         require(limited, "isa", f"native, or only groups of {', '.join(ON_ANY_ISA)}", self.isa)
         require(self.isa == "native" or self.device == "cpu", "isa", "native on a GPU", self.isa)
@@ -88,7 +91,7 @@ class BenchOptions:
         most = (side // FRAMELET_SIDE) ** 2
         require(1 <= self.batch_size <= most, "batch_size", f"between 1 and {most}, a picture's", self.batch_size)
         for file in self.scene_files:
-            require(file.is_file(), "scene_files", "scene files", file)
+            require(file.is_file(), "scene_files", "scene files that are there", file)
 
     @property
     def groups(self) -> tuple[str, ...]:

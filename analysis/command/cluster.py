@@ -63,6 +63,8 @@ class ClusterOptions:
     def __post_init__(self) -> None:
         limits.within(self, workers=limits.WORKERS, workers_least=(0, self.processes), memory_limit_gib=(0.0, 1e5))
         limits.within(self, retries=(0, 100), worker_wait_s=limits.WORKER_WAITS_S)
+        placed = not self.scheduler or _place_of(self.scheduler) is not None
+        require(placed, "scheduler", "an address such as tcp://host:8786", self.scheduler)
         alone = "none together with a scheduler, whose own cluster sets it"
         for name in ("workers_least", "memory_limit_gib") if self.scheduler else ():
             require(not getattr(self, name), name, alone, getattr(self, name))
@@ -111,6 +113,8 @@ def connected(options: ClusterOptions, say: Callable[[str], None] = lambda line:
             _require_port(options.scheduler)
             asyncio.run(_greeted(options.scheduler))
             client = Client(options.scheduler, timeout=WAIT_S)
+        except MemoryError as error:  # the length of a message, read from another protocol
+            raise _silent(options.scheduler, "what does is no scheduler of Dask") from error
         except (OSError, ValueError, TimeoutError) as error:
             reason = str(error) or f"it accepts connections, but sends no greeting within {WAIT_S} s"
             raise _silent(options.scheduler, reason) from error
@@ -187,10 +191,18 @@ _NO_TRACEBACKS = _NoTracebacks()
 
 def _require_port(address: str) -> None:
     """Raises OSError if nothing listens at an address: a client would retry until its timeout."""
+    place = _place_of(address)
+    if place:
+        socket.create_connection(place, CONNECT_S).close()
+
+
+def _place_of(address: str) -> tuple[str, int] | tuple[()] | None:
+    """Host and port of an address; none for a transport that has no ports, None for an address without them."""
     transport, _, place = address.rpartition("://")
+    if transport not in ("", "tcp", "tls", "ws", "wss"):
+        return ()
     host, _, port = place.rpartition(":")
-    if transport in ("", "tcp", "tls", "ws", "wss") and host and port.isdecimal():
-        socket.create_connection((host.strip("[]"), int(port)), CONNECT_S).close()
+    return (host.strip("[]"), int(port)) if host and port.isdecimal() else None
 
 
 def _silent(address: str, reason: object) -> InputError:

@@ -236,7 +236,7 @@ class RunOptions(ViewOptions):
 class ReportOptions:
     """The finished runs that a page compares."""
 
-    folders: Annotated[tuple[Path, ...], tyro.conf.Positional]
+    folders: Annotated[tuple[Path, ...], tyro.conf.Positional, tyro.conf.arg(metavar="FOLDER ...")]
     """Folders of finished runs."""
     out: Path = Path("out/report")
     """Folder for the results; it gets the page."""

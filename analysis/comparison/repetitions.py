@@ -25,7 +25,7 @@ from tsar.config import TsarConfig, closed_choices, require
 class InputsOptions:
     """The inputs, and the number of repetitions. Runs that are complete in the folder are not repeated."""
 
-    inputs: Annotated[tuple[str, ...], tyro.conf.Positional] = INPUTS
+    inputs: Annotated[tuple[str, ...], tyro.conf.Positional, tyro.conf.arg(metavar="[INPUT ...]")] = INPUTS
     """Built-in inputs, or other scenes by their names."""
     vary: Literal["seed", "phase"] = "seed"
     """What differs between repetitions: the seed (0, 1, …) or the phase (0, 1/n, …)."""

@@ -11,6 +11,7 @@ import tyro
 from analysis.command import limits
 from scenes.formats import FORMATS
 from tsar.config import require
+from tsar.named import require_known
 
 FORMATS_OF = {"pbrt": ".pbrt", "pbrt4": ".pbrt", "mitsuba": ".xml", "mitsuba3": ".xml", "luxrender": ".lxs",
               "gltf": ".gltf", "usd": ".usda"}  # fmt: skip
@@ -22,10 +23,10 @@ class ConvertOptions:
     """Converts a scene file of one renderer to that of another, with its meshes and pictures, and reports the
     losses."""
 
-    source: Annotated[Path, tyro.conf.Positional]
+    source: Annotated[Path, tyro.conf.Positional, tyro.conf.arg(metavar="SOURCE")]
     """Scene file: PBRT v3 or v4 (.pbrt), LuxRender 1.x (.lxs), Mitsuba 0.5 to 3 (.xml, .json), LuxCore (.cfg,
     .scn), or a model."""
-    target: Annotated[Path, tyro.conf.Positional]
+    target: Annotated[Path, tyro.conf.Positional, tyro.conf.arg(metavar="TARGET")]
     """File to write; meshes and pictures go to the folders models and textures beside it."""
     to: str = ""
     """Its format: pbrt, pbrt4, luxrender, luxrender-parts, mitsuba, mitsuba3, gltf, usd or an installed one; by
@@ -40,7 +41,7 @@ class ConvertOptions:
     def __post_init__(self) -> None:
         if self.to:
             FORMATS.require(self.to, "to")
-        require(self.source.is_file(), "source", "a scene file", self.source)
+        require(self.source.is_file(), "source", "a scene file that is there", self.source)
         require(self.source.resolve() != self.target.resolve(), "target", "another file than the source", self.target)
         require(self.root is None or self.root.is_dir(), "root", "a folder", self.root)
 
@@ -54,7 +55,7 @@ class ConvertOptions:
 class CheckOptions:
     """Renders scene files as converted for Mitsuba 3 and for LuxCore, and compares the pictures."""
 
-    scenes: Annotated[tuple[Path, ...], tyro.conf.Positional] = ()
+    scenes: Annotated[tuple[Path, ...], tyro.conf.Positional, tyro.conf.arg(metavar="[SCENE ...]")] = ()
     """Scene files; those of LuxRender and Mitsuba are also rendered as they are."""
     markers: bool = False
     """Check the places of known lamps in the pictures, from every format to every other."""
@@ -87,9 +88,9 @@ class CheckOptions:
     def __post_init__(self) -> None:
         limits.within(self, width_px=(16, 4096), samples=(1, 1 << 16), limit_s=(1e-3, 86400.0), mutations=(0, 1 << 24),
                       seed=(0, 1 << 31))  # fmt: skip
-        known = f"some of {', '.join(FORMATS_OF)}"
-        require(set(self.formats) <= set(FORMATS_OF), "formats", known, " ".join(self.formats))
+        for name in self.formats:
+            require_known(name, "formats", FORMATS_OF)
         given = bool(self.scenes) or self.markers or self.matrix or self.mutations > 0
         require(given, "scenes", "scene files, --markers, --matrix or --mutations", "none of them")
         for scene in self.scenes:
-            require(scene.is_file(), "scenes", "scene files", scene)
+            require(scene.is_file(), "scenes", "scene files that are there", scene)

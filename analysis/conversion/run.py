@@ -16,7 +16,7 @@ from analysis.conversion.options import FORMATS_OF, CheckOptions, ConvertOptions
 from analysis.storage.files import write_json, write_table
 from analysis.storage.results import own_results
 from analysis.storage.summary import with_source, write_summary
-from tsar.config import require
+from tsar.named import require_known
 
 
 def convert(options: ConvertOptions) -> dict[str, Any]:
@@ -53,7 +53,8 @@ def check(options: CheckOptions) -> list[Table]:
 
     groups = options.groups or tuple(GROUPS)
     with bad_input():
-        require(set(groups) <= set(GROUPS), "groups", f"some of {', '.join(GROUPS)}", " ".join(groups))
+        for name in groups:
+            require_known(name, "groups", GROUPS)
         written = ("table.csv", "markers.csv", "pictures.jpg", "worst.csv", "pairs.csv", "matrix.csv", "markers/*",
                     "matrix/*", "[0-9][0-9]-*/*", "mutations.csv", "mutations.journal")  # fmt: skip
         own_results(options.out, written)

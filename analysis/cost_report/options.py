@@ -10,6 +10,7 @@ from typing import Literal
 from analysis.command import limits
 from analysis.command.options import Device, Threads, Unprefixed
 from analysis.metrics.cost_model import CostParameters
+from analysis.study.asked import require_inputs
 from tsar.config import TsarConfig, closed_choices, require
 
 _FEWEST_BATCHES, _FEWEST_RESOLUTIONS = 3, 3
@@ -46,6 +47,7 @@ class MeasurementOptions:
     threads: Threads = 0
 
     def __post_init__(self) -> None:
+        require_inputs((self.input,), "input", numbers=True)
         for name in ("measured_batches", "measured_resolutions"):
             least = _FEWEST_BATCHES if name == "measured_batches" else _FEWEST_RESOLUTIONS
             values = getattr(self, name)

@@ -12,10 +12,17 @@ Examples: python scripts/perception.py stimuli --width-px 128 --frames 20 --out 
 
 from __future__ import annotations
 
-from analysis.command.cli import parse, require_files
+from analysis.command.cli import InputError, parse, require_files
 from analysis.command.cluster import ClusterOptions
 from analysis.command.extras import require_extra
-from analysis.perception.options import AdaptiveOptions, AnalyseOptions, StepOptions, StimuliOptions
+from analysis.perception.options import (
+    AdaptiveOptions,
+    AnalyseOptions,
+    ServeOptions,
+    SimulateOptions,
+    StepOptions,
+    StimuliOptions,
+)
 
 
 def main() -> None:
@@ -28,6 +35,10 @@ def main() -> None:
     if isinstance(options, StimuliOptions):
         require_files(*options.jobs)
         ClusterOptions(scheduler=options.scheduler).require_port()  # before slow imports
+    if isinstance(options, (SimulateOptions, ServeOptions)):
+        manifest = options.stimuli / "manifest.json"
+        if not manifest.is_file():
+            raise InputError(f"stimuli: expected {manifest}, written by the command 'stimuli' (it is missing)")
     from analysis.command.console import show
     from analysis.perception.run import run
 

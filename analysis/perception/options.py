@@ -28,7 +28,7 @@ STUDY_JOBS = (_ASSETS / "plane" / "study_job.txt", _ASSETS / "spheres" / "study_
 class StimuliOptions:
     """Renders the stimuli of job files, and a manifest with their hashes; continues where it was stopped."""
 
-    jobs: Annotated[tuple[Path, ...], tyro.conf.Positional] = ()
+    jobs: Annotated[tuple[Path, ...], tyro.conf.Positional, tyro.conf.arg(metavar="[JOB ...]")] = ()
     """Job files; the thesis' study where none is named: two scenes, eight levels, three point sets, truncated box."""
     width_px: int = 768
     """Width, pixels; of a frame, also its height."""
@@ -67,7 +67,7 @@ class StimuliOptions:
 class SimulateOptions:
     """Simulates observers that answer the stimuli of a folder; trials-simulated.parquet has one row a trial."""
 
-    stimuli: Annotated[Path, tyro.conf.Positional] = Path("out/perception")
+    stimuli: Annotated[Path, tyro.conf.Positional, tyro.conf.arg(metavar="[FOLDER]")] = Path("out/perception")
     """Folder of the command ``stimuli``."""
     observers: int = 12
     """Number of observers."""
@@ -105,7 +105,7 @@ class SimulateOptions:
 class AnalyseOptions:
     """Fits psychometric functions to trials, compares scenes and point sets, draws figures 19 to 25 of the thesis."""
 
-    trials: Annotated[tuple[Path, ...], tyro.conf.Positional] = (
+    trials: Annotated[tuple[Path, ...], tyro.conf.Positional, tyro.conf.arg(metavar="[TRIALS ...]")] = (
         Path("out/perception-simulated/trials-simulated.parquet"),
     )
     """Tables of trials (CSV or Parquet), such as several sessions; either of people or of simulated observers. They
@@ -179,7 +179,7 @@ class RecoverOptions:
 class ServeOptions:
     """Shows the trials to a person on a page of this machine; continues where it was stopped."""
 
-    observer: Annotated[str, tyro.conf.Positional]
+    observer: Annotated[str, tyro.conf.Positional, tyro.conf.arg(metavar="OBSERVER")]
     """Name of the person in the table of trials."""
     stimuli: Path = Path("out/perception")
     """Folder of the command ``stimuli``."""
@@ -204,7 +204,7 @@ class ServeOptions:
 class AdaptiveOptions:
     """Shows a policy and the framed renderer to the simulated observer, at equal cost and by batch size."""
 
-    inputs: Annotated[tuple[str, ...], tyro.conf.Positional] = INPUTS
+    inputs: Annotated[tuple[str, ...], tyro.conf.Positional, tyro.conf.arg(metavar="[INPUT ...]")] = INPUTS
     """Built-in inputs, or other scenes by their names."""
     policy: str = "thesis"
     """Policy that decides what is sampled, by name; the observer compares it with framed."""

@@ -27,7 +27,7 @@ class SpectrumOptions:
     thesis' example is --only ideal --ideal-samples 1024 --ideal-frames 512; it needs about 16 GiB and 32 times the time
     of the default."""
 
-    images: Annotated[tuple[Path, ...], tyro.conf.Positional] = ()
+    images: Annotated[tuple[Path, ...], tyro.conf.Positional, tyro.conf.arg(metavar="[IMAGE ...]")] = ()
     """Pictures to measure beside our own: PNG, JPEG or EXR of any size from 32 pixels."""
     only: Part | None = None
     """What to do, instead of everything: slopes (figs 1.3, 1.4), ideal (figs 5.3–5.5) or agreement; without it all
@@ -73,7 +73,8 @@ class SpectrumOptions:
     def __post_init__(self) -> None:
         require(not self.tsar.width_px, "width_px", "none here, where pictures are squares", self.tsar.width_px)
         require(len(self.inputs) > 0, "inputs", "at least one", self.inputs)
-        require_inputs((*self.inputs, self.input))
+        require_inputs(self.inputs)
+        require_inputs((self.input,), "input", numbers=True)
         limits.within(self, frames_per_input=(1, 100), samples_per_axis=(1, 16), threads=limits.THREADS)
         limits.within(self, ideal_samples=(32, 1 << 15), ideal_frames=(8, 1 << 15))
         limits.within(self, agreement_samples=(64, 1 << 15), agreement_frames=(16, 1 << 15))

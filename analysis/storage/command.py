@@ -22,9 +22,9 @@ EXIT_DIFFERENT = 1
 class SameOptions:
     """Two folders that the same command wrote."""
 
-    first: Annotated[Path, tyro.conf.Positional]
+    first: Annotated[Path, tyro.conf.Positional, tyro.conf.arg(metavar="FIRST")]
     """Folder of results."""
-    second: Annotated[Path, tyro.conf.Positional]
+    second: Annotated[Path, tyro.conf.Positional, tyro.conf.arg(metavar="SECOND")]
     """Folder of results."""
     ignore: tuple[str, ...] = ()
     """Names of files, entries of JSON files and columns to leave out."""

@@ -21,18 +21,24 @@ def require_distinct(options: object, *names: str) -> None:
         require(0 < len(chosen) == len(set(chosen)), name, "at least one, none twice", chosen)
 
 
-def require_inputs(inputs: Sequence[str]) -> None:
+def require_inputs(inputs: Sequence[str], field: str = "inputs", numbers: bool = False) -> None:
     """Checks that all are names of scenes; nothing is imported for the five inputs.
+
+    Args:
+        inputs: names.
+        field: the option that holds them.
+        numbers: whether the five inputs may be given by their numbers, too.
 
     Raises:
         ConfigError: one is not; the message has the known names and the nearest of them.
     """
-    if set(inputs) <= set(INPUTS):
+    known = {*INPUTS, *(map(str, range(len(INPUTS))) if numbers else ())}
+    if known.issuperset(inputs):
         return
     from scenes.catalog import SCENES
 
-    for name in inputs:
-        SCENES.require(name, "inputs")
+    for name in known.symmetric_difference(inputs) - known:
+        SCENES.require(name, field)
 
 
 def require_rows(name: str, rows: Sequence[int]) -> None:

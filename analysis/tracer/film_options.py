@@ -34,7 +34,10 @@ class FilmOptions(ViewOptions):
         super().__post_init__()
         require(not self.size or len(self.sides_px) == 2, "size", "such as 800x600", self.size)
         sides = (0, limits.SIDES_PX[1])
-        limits.within(self, sides_px=limits.SIDES_PX, width_px=sides, height_px=sides, time_s=limits.TIMES_S)
+        least, most = limits.SIDES_PX
+        fits = all(least <= side <= most for side in self.sides_px)
+        require(fits, "size", f"sides between {least} and {most}", self.size)
+        limits.within(self, width_px=sides, height_px=sides, time_s=limits.TIMES_S)
         two = self.size and (self.width_px or self.height_px)
         require(not two, "size", "none together with width_px and height_px", self.size)
 

@@ -12,7 +12,7 @@ from analysis.command import limits
 from analysis.command.cluster import WAIT_S, ClusterOptions
 from analysis.command.options import Device, Scheduler, Seed, Threads, Unprefixed, WorkerWait
 from analysis.tracer.film_options import FilmOptions
-from renderer.sampling import POINT_SETS
+from renderer.sampling import require_point_set
 from tsar.config import closed_choices, require
 
 LEVELS = (1, 8, 27, 64, 125, 216, 343, 512)
@@ -24,7 +24,7 @@ LEVELS = (1, 8, 27, 64, 125, 216, 343, 512)
 class GalleryOptions:
     """One picture for each effect of the ray tracer."""
 
-    effects: Annotated[tuple[str, ...], tyro.conf.Positional] = ()
+    effects: Annotated[tuple[str, ...], tyro.conf.Positional, tyro.conf.arg(metavar="[EFFECT ...]")] = ()
     """Effects by name; all where none is named."""
     width_px: int = 480
     """Width, pixels."""
@@ -43,7 +43,7 @@ class GalleryOptions:
     """Folder for the results; NAME.png and NAME.exr of each, gallery.jpg with all, and summary.json."""
 
     def __post_init__(self) -> None:
-        POINT_SETS.require(self.point_set, "point_set")
+        require_point_set(self.point_set, self.samples)
         sides, samples = limits.SIDES_PX, (1, 1 << 16)
         limits.within(self, width_px=sides, height_px=sides, samples=samples, seed=limits.SEEDS, threads=limits.THREADS)
 
@@ -103,7 +103,7 @@ class PointSetOptions:
 class TileOptions(FilmOptions):
     """One picture of a scene, in tiles over processes or machines."""
 
-    scene: Annotated[str, tyro.conf.Positional]
+    scene: Annotated[str, tyro.conf.Positional, tyro.conf.arg(metavar="SCENE")]
     """Built-in scene by name, a scene file or a model, which all workers can read."""
     samples: int = 32
     """Samples per pixel; a cube for the point set stratified."""
@@ -126,7 +126,7 @@ class TileOptions(FilmOptions):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        POINT_SETS.require(self.point_set, "point_set")
+        require_point_set(self.point_set, self.samples)
         limits.within(
             self,
             samples=(1, 1 << 16),
@@ -142,7 +142,7 @@ class TileOptions(FilmOptions):
 class JobOptions:
     """Every combination of sampling levels, point sets and time filters of a job file."""
 
-    job: Annotated[Path, tyro.conf.Positional]
+    job: Annotated[Path, tyro.conf.Positional, tyro.conf.arg(metavar="JOB")]
     """Job file: seven lines, as in figure 12 of the motion-blur perception thesis."""
     scene: str = ""
     """A block file, or the built-in planescene or spheresscene; by default the scene in the job's name."""

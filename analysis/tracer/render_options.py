@@ -12,7 +12,7 @@ import tyro
 from analysis.command import limits
 from analysis.command.options import Device, Seed, Threads
 from analysis.tracer.film_options import FilmOptions
-from renderer.sampling import POINT_SETS
+from renderer.sampling import require_point_set
 from tsar.config import closed_choices, require
 
 _NOT_OF_THE_STILLS = ("frames", "threads", "format", "explain", "out")
@@ -23,7 +23,7 @@ _NOT_OF_THE_STILLS = ("frames", "threads", "format", "explain", "out")
 class RenderOptions(FilmOptions):
     """A still, or a sequence of stills at a constant rate, of a scene or a model."""
 
-    scene: Annotated[str, tyro.conf.Positional]
+    scene: Annotated[str, tyro.conf.Positional, tyro.conf.arg(metavar="SCENE")]
     """Built-in scene, by name or number; a scene file; or a model (OBJ, PLY, STL, GLB, glTF, USD), by default seen as a
     whole from the front."""
     samples_per_axis: int = 2
@@ -69,7 +69,7 @@ class RenderOptions(FilmOptions):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        POINT_SETS.require(self.point_set, "point_set")
+        require_point_set(self.point_set, self.samples or 1)  # none are those of the regular grid
         limits.within(
             self,
             samples_per_axis=(1, 64),
@@ -82,9 +82,6 @@ class RenderOptions(FilmOptions):
             seed=limits.SEEDS,
             threads=limits.THREADS,
         )
-
-        cube = round(self.samples ** (1 / 3)) ** 3 == self.samples
-        require(self.point_set != "stratified" or cube, "samples", "a cube for the point set stratified", self.samples)
         require(not self.layers or self.format == "exr", "layers", "the format exr", self.format)
         if self.in_rounds:
             require(self.rounds != 1, "rounds", "at least 2", self.rounds)

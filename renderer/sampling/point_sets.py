@@ -14,16 +14,13 @@ from jaxtyping import Float
 from numpy.typing import NDArray
 from scipy.stats import qmc
 
-from renderer.sampling import POINT_SETS
+from renderer.sampling import POINT_SETS, require_point_set
 from scenes.arithmetic import log, power
 
 Points = Float[NDArray[np.float64], "n 3"]
-COUNT_MAX = 1 << 16
-"""Greatest number of points of a set."""
 
 BELOW_ONE = float(np.nextafter(1.0, 0.0))
 
-_POISSON_MAX = 4096
 _POISSON_START = 0.75  # initial share of the densest packing's distance: dart throwing alone reaches about 0.7
 _POISSON_TRIES = 4096
 
@@ -59,10 +56,7 @@ def point_set(name: str, count: int, seed: int = 0) -> Points:
     Raises:
         ValueError: for another name, a count that the set cannot have, or points that do not lie in the cube.
     """
-    POINT_SETS.require(name)
-    most = _POISSON_MAX if name == "poisson" else COUNT_MAX
-    if not 1 <= count <= most:
-        raise ValueError(f"point set {name}: expected 1 to {most} points, got {count}")
+    require_point_set(name, count)
     if name in _BALANCED and count & (count - 1):
         power_below = 1 << count.bit_length() - 1
         warnings.warn(
@@ -83,16 +77,8 @@ def hammersley(count: int, _rng: np.random.Generator) -> Points:
 
 
 def stratified(count: int, rng: np.random.Generator) -> Points:
-    """One random point in each cell of a cubic grid.
-
-    Raises:
-        ValueError: the count is not a cube.
-    """
+    """One random point in each cell of a cubic grid, of as many cells as points."""
     side = round(power(count, 1.0 / 3.0))
-    if math.prod((side,) * 3) != count:
-        below = math.floor(power(count, 1.0 / 3.0) + 1e-9)
-        cubes = " or ".join(str(math.prod((near,) * 3)) for near in (max(below, 1), below + 1))
-        raise ValueError(f"point set stratified: expected a cube of samples, such as {cubes}, got {count}")
     cells = np.stack(np.meshgrid(*[np.arange(side)] * 3, indexing="ij"), axis=-1).reshape(-1, 3)
     return (cells + rng.random((count, 3))) / side
 

@@ -47,7 +47,7 @@ REFUSED: dict[str, tuple[str, ...]] = {
     "cost_report --input nonsense": ("nonsense", "fly-by"),
     "cost_report --nonsense": ("--nonsense",),
     "gallery fog": ("effects", "one of plain", "fog"),
-    "gallery plain --samples 26 --point-set stratified": ("expected a cube of samples", "27", "26"),
+    "gallery plain --samples 26 --point-set stratified": ("samples: expected a cube", "27", "26"),
     "gallery plain --width-px 0": ("width_px", "0"),
     "inputs --repetitions 0": ("repetitions", "between 1 and 1000", "0"),
     "inputs --vary weather": ("--vary", "weather"),
@@ -141,7 +141,7 @@ REFUSED: dict[str, tuple[str, ...]] = {
     "suitability --display.rate-hz 75": ("rate_hz", "60 or 120"),
     "suitability --framed-rate-hz 0": ("framed_rate_hz", "between 0.01 and 1000"),
     "tiles fog": ("scene", "one of", "fog"),
-    "tiles plain --samples 9 --point-set stratified": ("expected a cube of samples", "9"),
+    "tiles plain --samples 9 --point-set stratified": ("samples: expected a cube", "9"),
     "tiles plain --scheduler nowhere": ("scheduler", "nowhere"),
     "tiles plain --study 0": ("study", "0"),
 }

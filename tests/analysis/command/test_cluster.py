@@ -5,6 +5,7 @@ from __future__ import annotations
 import socket
 import subprocess
 import sys
+import threading
 from types import SimpleNamespace
 from typing import Any
 
@@ -60,6 +61,24 @@ def test_a_port_that_accepts_but_does_not_speak_the_protocol_is_refused(
     address = f"tcp://127.0.0.1:{port.getsockname()[1]}"
     with pytest.raises(InputError, match="sends no greeting"), cluster.connected(cluster.ClusterOptions(0, address)):
         pass
+
+
+def test_a_port_of_another_protocol_is_refused(port: socket.socket, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The first bytes of an answer by HTTP, read as the length of a message, are more memory than any machine has."""
+    port.listen()
+
+    def answer() -> None:
+        taken, _ = port.accept()
+        with taken:
+            taken.sendall(b"HTTP/1.1 400 Bad Request\r\n\r\n")
+            taken.recv(1 << 16)
+
+    threading.Thread(target=answer, daemon=True).start()
+    address = f"tcp://127.0.0.1:{port.getsockname()[1]}"
+    with monkeypatch.context() as patch:
+        patch.setattr(cluster, "_require_port", lambda address: None)
+        with pytest.raises(InputError, match="no scheduler"), cluster.connected(cluster.ClusterOptions(0, address)):
+            pass
 
 
 def test_a_dashboard_elsewhere_is_told_as_it_can_be_reached(port: socket.socket) -> None:

@@ -57,6 +57,8 @@ def test_no_box_of_a_help_has_more_than_ten_options(call: tuple[str, ...], monke
     with pytest.raises(SystemExit):
         called(monkeypatch, *call, "--help")
     text = capsys.readouterr().out
+    arguments = text.partition("positional arguments")[2].partition("╰")[0]
+    assert not re.findall(r"^│ \W*(?:STR|PATH|INT|FLOAT)\b.*", arguments, re.MULTILINE), "arguments without a name"
     assert not re.findall(r".*(?:\bNone\b|''|default: \)|\{,).*", text), "values that stand for none"
     parts = re.split(r"^ (\S.*?) *\n -{9,} *$", text, flags=re.MULTILINE)[1:]
     boxes = dict(zip(parts[::2], parts[1::2], strict=True))
