@@ -249,12 +249,22 @@
       redraw();
     },
   };
+  // A control that was clicked leaves space and arrows to the page; one that was reached by the keyboard keeps its own.
+  let [clicked, pointed] = [null, false];
+  document.addEventListener("pointerdown", () => [clicked, pointed] = [null, true], true);
+  for (const kind of ["click", "change"])
+    document.addEventListener(kind, (event) => {
+      const opens = kind === "click" && event.target.matches("select"); // keys then go through its list
+      if (pointed && !opens) clicked = document.activeElement;
+    });
   document.addEventListener("keydown", (event) => {
+    pointed = false;
+    if (event.key === "Tab") clicked = null;
     if (event.ctrlKey || event.metaKey || event.altKey) return;
     if (event.key === "r") return hold(true);
     const at = event.target;
     const own = at.matches?.("select, summary, input[type=radio], #exposure") || (event.key === " " && at.matches?.("button, input[type=checkbox]"));
-    if (own || !KEYS[event.key]) return;
+    if ((own && at !== clicked) || !KEYS[event.key]) return;
     event.preventDefault();
     if (moving && event.key !== " ") stop();
     KEYS[event.key]();

@@ -98,6 +98,28 @@ def test_keys_move_time_hold_the_reference_and_swap(opened: Opened) -> None:
     assert near(seen(page, RIGHT), (200, 0, 0)), "no value"
 
 
+@pytest.mark.parametrize("place", [".thumb >> nth=1", "#fit", "#swap", "#beside", "input[value=signed]", "summary"])
+def test_space_and_arrows_are_of_the_page_after_a_click(opened: Opened, place: str) -> None:
+    """A control that was clicked has the focus; it has these keys only where the keyboard moved the focus there."""
+    page = opened.page
+    parts = "#comparer select, #comparer input:not(#slider), details"
+    controls = f"[...document.querySelectorAll('{parts}')].map((one) => [one.value, one.checked, one.open])"
+    move(page, 2)
+    page.locator(place).first.click()
+    before = page.evaluate(controls)
+    page.keyboard.press("ArrowRight")
+    shown(page, 3)
+    page.keyboard.press(" ")
+    expect(page.locator("#play")).to_have_text("pause")
+    page.keyboard.press(" ")
+    expect(page.locator("#play")).to_have_text("play")
+    assert page.evaluate(controls) == before
+    page.keyboard.press("Shift+Tab")
+    page.keyboard.press("Tab")
+    page.keyboard.press(" ")
+    expect(page.locator("#play")).to_have_text("play")
+
+
 def test_errors_have_their_colours_and_the_loupe_their_values(opened: Opened) -> None:
     page = opened.page
     move(page, 3)
