@@ -7,7 +7,8 @@ bits; Pillow reads other files.
 from __future__ import annotations
 
 import warnings
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager, nullcontext
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, BinaryIO, TypeVar
@@ -107,13 +108,19 @@ def _require_size(width: int, height: int) -> None:
         raise ValueError(f"expected at most {PIXELS_MOST:,} pixels, got {width} x {height}")
 
 
+@contextmanager
+def _by_pillow(file: Path | BinaryIO) -> Iterator[Image.Image]:
+    """An image that Pillow opens; it takes a stream, because it reads turned TIFF files by their path in wrong rows."""
+    with file.open("rb") if isinstance(file, Path) else nullcontext(file) as stream, warnings.catch_warnings():
+        warnings.simplefilter("ignore", Image.DecompressionBombWarning)  # large images are rejected here
+        with Image.open(stream) as image:
+            _require_size(*image.size)
+            yield image
+
+
 def by_pillow(path: Path | BinaryIO) -> Pixels | NDArray[np.uint8] | NDArray[np.uint16]:
     """Like :func:`decoded`, for a file that Pillow reads, or for its content."""
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", Image.DecompressionBombWarning)  # large images are rejected here
-        image = Image.open(path)
-    with image:
-        _require_size(*image.size)
+    with _by_pillow(path) as image:
         if image.mode == "F":
             return _three(np.array(image, np.float32)[..., None])
         if image.mode.startswith("I"):  # 16-bit grey
@@ -138,11 +145,7 @@ def alpha_of(file: Path | BinaryIO) -> Pixels:
 
 
 def _alpha_by_pillow(file: Path | BinaryIO) -> Pixels:
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", Image.DecompressionBombWarning)  # large images are rejected here
-        image = Image.open(file)
-    with image:
-        _require_size(*image.size)
+    with _by_pillow(file) as image:
         if "A" not in image.getbands() and "transparency" not in image.info:
             return np.ones((image.height, image.width), np.float32)
         return np.array(image.convert("RGBA"))[..., 3].astype(np.float32) / np.float32(255.0)

@@ -139,7 +139,8 @@ class _Reader:
             names = name if "name" in node else self.data.at("cameras", node["camera"]).get("name", name)
             if names in self._cameras:
                 self.report.add(names, "a further camera of this name")
-            self._cameras.setdefault(names, camera_at_node(self.data, node["camera"], matrix, track))
+            made = camera_at_node(self.data, node["camera"], matrix, track, self.report)
+            self._cameras.setdefault(names, made)
         if "KHR_lights_punctual" in node.get("extensions", {}):
             self._add_light(number, now, name, moving)
         if "mesh" in node and "skin" in node:

@@ -31,8 +31,10 @@ from scenes.models.model import ModelCamera, axis_of, shorter_fov_deg, unscaled
 _SHARP = 1e-6  # relative width of the edge of a spot that has none
 
 
-def camera_at_node(data: GltfData, number: int, matrix: Matrix, track: RigidTrack | None) -> ModelCamera:
-    """A camera at a node with this transform and motion.
+def camera_at_node(
+    data: GltfData, number: int, matrix: Matrix, track: RigidTrack | None, report: LossReport
+) -> ModelCamera:
+    """A camera at a node with this transform and motion; one that leaves its aspect to the picture has a square one.
 
     Raises:
         SceneError: the camera has no positive extent.
@@ -47,6 +49,8 @@ def camera_at_node(data: GltfData, number: int, matrix: Matrix, track: RigidTrac
         if not min(wide, high) > 0.0:
             raise misplaced(place, "an xmag and a ymag other than 0", f"{wide:g} and {high:g}")
         return ModelCamera(OrthographicCamera(unscaled(matrix), min(wide, high), track), wide / high)
+    if "aspectRatio" not in lens:
+        report.hint(place, "no aspectRatio, so that the field of view is along the height of any picture", "a square")
     aspect, fov = float(lens.get("aspectRatio", 1.0)), float(lens["yfov"])
     if not 0.0 < fov < math.pi:
         raise misplaced(f"{place}.yfov", "an angle in (0, π)", f"{fov:g}")

@@ -51,10 +51,15 @@ _UNUSED = ("map_ka", "map_aat")  # ambient light, and anti-aliasing of pictures
 
 
 @dataclass
-class _Entry:
+class Entry:
     """The entry of a material in a library: rests of lines by keyword in lower case."""
 
     lines: dict[str, str] = field(default_factory=dict)
+
+    @property
+    def without_maps(self) -> Entry:
+        """The same without its images."""
+        return Entry({keyword: rest for keyword, rest in self.lines.items() if not keyword.startswith(_MAPS)})
 
     def number(self, name: str, default: float) -> float:
         words = self.lines.get(name, "").split()
@@ -77,18 +82,18 @@ def _number(word: str) -> float:
     except ValueError:
         value = float("nan")
     if not np.isfinite(value):
-        raise SceneError(f"material library: expected a number, got {word[:20]!r}")
+        raise SceneError(f"expected a number, got {word[:20]!r}")
     return value
 
 
-def entries(text: str) -> dict[str, _Entry]:
+def entries(text: str) -> dict[str, Entry]:
     """Materials of a library by name; of several with one name the first is used."""
-    found: dict[str, _Entry] = {}
+    found: dict[str, Entry] = {}
     entry = None
     for line in joined_lines(text).splitlines():
         words = line.split(maxsplit=1)
         if len(words) == 2 and words[0].lower() == "newmtl":
-            entry = _Entry()
+            entry = Entry()
             found.setdefault(words[1].strip(), entry)
         elif len(words) == 2 and entry is not None:
             entry.lines[words[0].lower()] = words[1].strip()
@@ -162,7 +167,7 @@ def _texture(
     return ImageTexture(image, found.pair("-s", 1.0), found.pair("-o", 0.0), wrap, source=str(path))
 
 
-def material_of(name: str, entry: _Entry, sources: Sources, report: LossReport, facets: bool = False) -> Material:
+def material_of(name: str, entry: Entry, sources: Sources, report: LossReport, facets: bool = False) -> Material:
     """A material of a library, for path tracing with ``facets``.
 
     Raises:
@@ -191,7 +196,7 @@ def material_of(name: str, entry: _Entry, sources: Sources, report: LossReport, 
 
 
 def _along_paths(
-    material: Material, opacity: float, entry: _Entry, sources: Sources, where: str, report: LossReport
+    material: Material, opacity: float, entry: Entry, sources: Sources, where: str, report: LossReport
 ) -> Material:
     """A material with its normal map and its holes."""
 
@@ -230,7 +235,7 @@ def _channel(name: str, path: Path) -> Pixels:
     return values.mean(axis=2) if name != "m" and (alpha == 1.0).all() else alpha
 
 
-def _reflecting(entry: _Entry, texture: Texture, where: str, report: LossReport) -> Material:
+def _reflecting(entry: Entry, texture: Texture, where: str, report: LossReport) -> Material:
     """The material for the colours by ``illum``."""
     kind = int(entry.number("illum", -1))
     if "pm" in entry.lines or "pr" in entry.lines:

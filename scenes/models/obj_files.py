@@ -19,7 +19,7 @@ from scenes.canonical.values import vertices_of
 from scenes.formats.geometry.polygons import triangles_of
 from scenes.formats.losses import LossReport
 from scenes.loading import decode_srgb
-from scenes.models.mtl_files import entries, material_of
+from scenes.models.mtl_files import Entry, entries, material_of
 from scenes.models.plain_files import GREY
 from scenes.models.smoothing import corner_normals, with_corners
 from scenes.models.sources import Sources, joined_lines, text_of
@@ -66,7 +66,7 @@ def read_obj(sources: Sources, report: LossReport, facets: bool = False) -> tupl
         report.add(stem, f"lines of the kind {keyword!r}")
     if file.few:
         report.add(stem, f"faces of fewer than three corners ({file.few})")
-    materials = _materials(file.libraries, sources, report, facets)
+    materials = _materials(file, sources, report, facets)
     points = _table(file.points, (3, 4, 6, 7, 8), "v")
     uvs, normals = _table(file.uvs, (1, 2, 3), "vt"), _table(file.normals, (3,), "vn")
     if not np.isfinite(points[:, :3]).all():
@@ -148,18 +148,29 @@ def _table(rows: list[str], widths: Sequence[int], keyword: str) -> NDArray[np.f
         raise SceneError(f"cannot be read: {error}") from None
 
 
-def _materials(libraries: list[str], sources: Sources, report: LossReport, facets: bool) -> dict[str, Material]:
-    """Materials of all libraries; of several with one name the first is used."""
-    found: dict[str, Material] = {}
-    for line in libraries:
+def _materials(file: _File, sources: Sources, report: LossReport, facets: bool) -> dict[str, Material]:
+    """Materials of all libraries that faces have; of several with one name the first is used."""
+    found: dict[str, Entry] = {}
+    for line in file.libraries:
         # a name may contain spaces, and a line several names
         names = [line] if sources.find(line) is not None else line.split() or [line]
         for name in names:
             path = sources.known(name, sources.path.stem, report, "the materials")
-            for material, entry in entries("" if path is None else text_of(path)).items():
-                if material not in found:
-                    found[material] = material_of(material, entry, sources, report, facets)
-    return found
+            found = entries("" if path is None else text_of(path)) | found
+    for name, entry in found.items():
+        if name not in file.groups:
+            try:
+                material_of(name, entry.without_maps, sources, LossReport(), facets)
+            except SceneError as error:
+                report.hint(f"material {name}, which no face has", str(error))
+    return {name: _material(name, found[name], sources, report, facets) for name in file.groups if name in found}
+
+
+def _material(name: str, entry: Entry, sources: Sources, report: LossReport, facets: bool) -> Material:
+    try:
+        return material_of(name, entry, sources, report, facets)
+    except SceneError as error:
+        raise SceneError(f"material {name}: {error}") from None
 
 
 def _part(

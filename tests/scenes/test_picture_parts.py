@@ -11,6 +11,7 @@ import pytest
 
 from scenes.canonical import SceneError
 from scenes.loading import is_linear, read_alpha, read_image
+from scenes.pictures import decoded
 
 RAMP = np.arange(1, 7, dtype=np.float32).reshape(2, 3)
 COLOURS = np.stack([RAMP, 10.0 * RAMP, 100.0 * RAMP], axis=-1)
@@ -121,3 +122,15 @@ def test_white_may_be_zero_in_tiff(kind: type, tmp_path: Path) -> None:
 def test_opacity_lies_as_the_colours_of_a_turned_tiff(tmp_path: Path) -> None:
     (tmp_path / "a.tif").write_bytes(tiff(np.zeros((2, 3), np.uint16), False, 6))
     assert read_image(tmp_path / "a.tif").shape == (3, 2, 3) and read_alpha(tmp_path / "a.tif").shape == (3, 2)
+
+
+@pytest.mark.parametrize("orientation", range(1, 9))
+@pytest.mark.parametrize("kind", [np.uint8, np.uint16])
+def test_grey_tiff_without_compression_is_turned(kind: type, orientation: int, tmp_path: Path) -> None:
+    values = (np.arange(6).reshape(2, 3) * (np.iinfo(kind).max // 5)).astype(kind)
+    flipped = (values, values[:, ::-1], values[::-1, ::-1], values[::-1])[(orientation - 1) % 4]
+    turns = {5: values, 6: values[::-1], 7: values[::-1, ::-1], 8: values[:, ::-1]}
+    (tmp_path / "a.tif").write_bytes(tiff(values, False, orientation))
+    expected = turns[orientation].T if orientation > 4 else flipped
+    assert np.array_equal(decoded(tmp_path / "a.tif")[..., 1], expected)
+    assert read_alpha(tmp_path / "a.tif").shape == expected.shape

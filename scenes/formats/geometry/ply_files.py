@@ -11,19 +11,20 @@ from __future__ import annotations
 import struct
 import warnings
 from collections.abc import Callable
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from scenes.canonical import Mesh, SceneError
 from scenes.formats.geometry.checked import check_numbers, checked_mesh
-from scenes.formats.geometry.ply_headers import Element, header_of
+from scenes.formats.geometry.ply_headers import Element, Header, header_of
 from scenes.formats.geometry.polygons import triangles_of, triangles_of_strips
 from scenes.formats.losses import LossReport
 
-_UVS = (("u", "v"), ("s", "t"), ("texture_u", "texture_v"), ("texture_s", "texture_t"))
-_COLOURS = (("red", "green", "blue"), ("r", "g", "b"), ("diffuse_red", "diffuse_green", "diffuse_blue"))
-_SURFACES = ("face", "tristrips")
+UVS = (("u", "v"), ("s", "t"), ("texture_u", "texture_v"), ("texture_s", "texture_t"))
+COLOURS = (("red", "green", "blue"), ("r", "g", "b"), ("diffuse_red", "diffuse_green", "diffuse_blue"))
+SURFACES = ("face", "tristrips")
 
 
 def read_ply(content: bytes, name: str, report: LossReport) -> Mesh:
@@ -37,35 +38,57 @@ def read_ply(content: bytes, name: str, report: LossReport) -> Mesh:
     Raises:
         SceneError: it is not a PLY file, or does not match its header.
     """
-    return read_coloured_ply(content, name, report)[0]
+    return read_ply_model(content, name, report).mesh
 
 
-def read_coloured_ply(content: bytes, name: str, report: LossReport) -> tuple[Mesh, NDArray[np.uint8] | None]:
-    """Like :func:`read_ply`, with the colours ``(v, 3)`` of the vertices, eight bits per channel, if there are any."""
-    tables = _tables(content, name, report)
+@dataclass(frozen=True)
+class PlyModel:
+    """What a file holds.
+
+    Attributes:
+        mesh: its faces and its strips of triangles.
+        colors: of the vertices ``(v, 3)``, eight bits per channel; None if there are none.
+        vertex: all columns of the vertices by name.
+        header: of the file.
+    """
+
+    mesh: Mesh
+    colors: NDArray[np.uint8] | None
+    vertex: dict[str, NDArray]
+    header: Header
+
+
+def read_ply_model(content: bytes, name: str, report: LossReport) -> PlyModel:
+    """Like :func:`read_ply`, with what the file holds beside its mesh."""
+    header = header_of(content, name)
+    tables = _tables(header, name, report)
     vertex, colors = tables.get("vertex", {}), None
-    for names in _COLOURS:
+    for names in COLOURS:
         if colors is None and set(names) <= set(vertex):
-            kinds = {part[0]: part[1] for element in header_of(content, name)[1] for part in element.properties}
             columns = np.stack([vertex[part] for part in names], axis=1)
-            scale = 255.0 if kinds[names[0]][0] == "f" else 1.0 / 257.0 if kinds[names[0]] == "u2" else 1.0
-            colors = np.clip(np.rint(columns * scale), 0, 255).astype(np.uint8)
-    return _mesh(tables, name, report), colors
+            colors = eight_bits(columns, header.kind_of("vertex", names[0]))
+    return PlyModel(_mesh(tables, name, report), colors, vertex, header)
 
 
-def _tables(content: bytes, name: str, report: LossReport) -> dict[str, dict[str, NDArray]]:
+def eight_bits(values: NDArray, kind: str) -> NDArray[np.uint8]:
+    """Colours or opacities of a type of PLY files as eight bits: fractions, or whole numbers of 8 or 16 bits."""
+    scale = 255.0 if kind[0] == "f" else 1.0 / 257.0 if kind == "u2" else 1.0
+    return np.clip(np.rint(values * scale), 0, 255).astype(np.uint8)
+
+
+def _tables(header: Header, name: str, report: LossReport) -> dict[str, dict[str, NDArray]]:
     """Columns of each element by name; for faces and strips, their corners."""
-    order, elements, body = header_of(content, name)
+    order, body = header.order, header.body
     numbers = _numbers(body, name) if order == "" else None
     tables: dict[str, dict[str, NDArray]] = {}
     at = 0
-    for element in elements:
+    for element in header.elements:
         if any(kind for _, _, kind in element.properties):
             if numbers is None:
                 faces, at = _binary_faces(body, at, element, order, name)
             else:
                 faces, at = _ascii_faces(numbers, at, element, name)
-            if element.name in _SURFACES:
+            if element.name in SURFACES:
                 tables[element.name] = dict(zip(("corners", "counts"), faces, strict=True))
             elif element.count:
                 report.add(name, f"{element.count} elements of the kind {element.name!r}")
@@ -160,7 +183,7 @@ def _indices_of(element: Element, name: str) -> tuple[str, str, str]:
     """
     lists = [part for part in element.properties if part[2]]
     found = [part for part in lists if part[0].startswith("vertex_ind")]
-    if not found and element.name in _SURFACES:
+    if not found and element.name in SURFACES:
         raise SceneError(f"{name}: expected a list of vertex indices in {element.name!r}")
     return (found or lists)[0]
 
@@ -236,7 +259,7 @@ def _mesh(tables: dict[str, dict[str, NDArray]], name: str, report: LossReport) 
         raise SceneError(f"{name}: expected vertices with x, y and z, and faces")
     points = np.stack([vertex[axis] for axis in "xyz"], axis=1)
     normals = np.stack([vertex[f"n{axis}"] for axis in "xyz"], axis=1) if "nx" in vertex else None
-    uvs = next((np.stack([vertex[u], vertex[v]], axis=1) for u, v in _UVS if u in vertex and v in vertex), None)
+    uvs = next((np.stack([vertex[u], vertex[v]], axis=1) for u, v in UVS if u in vertex and v in vertex), None)
     faces = [np.zeros((0, 3))]
     if polygons is not None:
         faces.append(_triangles(points, polygons["corners"], polygons["counts"], normals, uvs, name, report))

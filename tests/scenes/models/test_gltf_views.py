@@ -63,6 +63,16 @@ def test_the_first_camera_is_used_and_others_by_name(tmp_path: Path) -> None:
     assert again.camera.to_world[2, 3] == 9.0, "six numbers are a camera of their own"
 
 
+def test_a_camera_without_an_aspect_says_so(tmp_path: Path) -> None:
+    """By the specification its aspect is that of the picture, and its field of view along the height."""
+    file = with_cameras(tmp_path)
+    file.json["cameras"][0] = {"type": "perspective", "perspective": {"yfov": 0.8}}
+    scene, losses = load_seen(str(file.written()), Look())
+    assert scene.film.width_px == scene.film.height_px
+    (loss,) = losses
+    assert "cameras[0].perspective: no aspectRatio" in loss
+
+
 def test_a_named_camera_by_the_command(tmp_path: Path, monkeypatch, capsys) -> None:
     path, out = with_cameras(tmp_path).written(), tmp_path / "out"
     arguments = (str(path), "--size", "16x8", "--out", str(out), "--camera")
