@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 import codecs
+import csv
 import io
+import re
+import warnings
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
@@ -22,6 +25,9 @@ REQUIRED = ("observer", "samples", "correct")
 _USUAL = {"observer_kind": "unknown", **dict.fromkeys(CONDITIONS, "all")}
 """Values of columns that a table may lack."""
 
+_TEXTS = ("observer_kind", "observer", *CONDITIONS)
+_NOTHING = ("", "NA", "N/A", "NaN", "nan", "null", "NULL", "None", "<NA>")
+_SEPARATOR = re.compile(r"\s*sep=(.)[ \t]*\n")  # as Excel writes it
 _RIGHT = {"1": True, "true": True, "yes": True, "0": False, "false": False, "no": False}
 _UNFIT = ("false", "0", "0.0")
 _SIDES = ("left", "right")
@@ -37,12 +43,15 @@ def read_trials(paths: Sequence[Path]) -> tuple[pd.DataFrame, str]:
     Raises:
         InputError: a file cannot be read, as :func:`checked_trials`, or the kinds of two files differ.
     """
-    tables, kinds = [], dict[str, Path]()
+    tables, kinds, seen = [], dict[str, Path](), set[Path]()
     for path in paths:
+        if path.resolve() in seen:
+            raise InputError(f"trials: expected different tables, got {path} twice")
+        seen.add(path.resolve())
         comma = path.suffix.lower() == ".csv"
         try:
             table = _csv(path.read_bytes()) if comma else pd.read_parquet(path)
-        except (OSError, ValueError) as error:
+        except (OSError, ValueError, csv.Error) as error:
             reason = " ".join(str(error).split())
             raise InputError(f"trials: {path}: cannot be read as {'CSV' if comma else 'Parquet'} ({reason})") from None
         trials, kind = checked_trials(table, str(path))
@@ -66,14 +75,35 @@ def _csv(content: bytes) -> pd.DataFrame:
         text = content.decode("utf-16" if wide else "utf-8-sig")
     except UnicodeDecodeError:
         text = content.decode("cp1252", errors="replace")
-    head = text.lstrip().partition("\n")[0]
-    between = max(",;\t", key=head.count)
-    decimal = "," if between == ";" else "."
-    table = pd.read_csv(io.StringIO(text), sep=between, decimal=decimal, skipinitialspace=True)
-    table = table.rename(columns=lambda name: str(name).strip().lower())
-    if not table.columns.is_unique:
-        raise ValueError(f"two columns {table.columns[table.columns.duplicated()][0]}")
-    return table
+    text = "\n".join(text.splitlines())
+    said, text = _SEPARATOR.match(text), _SEPARATOR.sub("", text, count=1).lstrip()
+    head = text.partition("\n")[0]
+    outside = re.sub(r'"[^"]*"', "", head)
+    between = said[1] if said else max(",;\t", key=outside.count)
+    # separators at the ends of lines would be an index; what they leave out is empty anyway
+    text = re.sub(rf"[ {between}]+$", "", text, flags=re.MULTILINE)
+    names = next(csv.reader([head.rstrip()], delimiter=between, skipinitialspace=True), [])
+    plain = [name.strip().lower() for name in names if name.strip()]
+    twice = next((name for number, name in enumerate(plain) if name in plain[:number]), None)
+    if twice is not None:
+        raise ValueError(f"two columns {twice}")
+    texts = [name for name in names if name.strip().lower() in _TEXTS]  # 007 is not 7, and NA may be a name
+    with warnings.catch_warnings():
+        warnings.simplefilter("error", pd.errors.ParserWarning)
+        try:
+            table = pd.read_csv(
+                io.StringIO(text),
+                sep=between,
+                decimal="," if between == ";" else ".",
+                skipinitialspace=True,
+                index_col=False,
+                dtype=dict.fromkeys(texts, str),
+                keep_default_na=False,
+                na_values={name: [""] if name in texts else [*_NOTHING] for name in names},
+            )
+        except pd.errors.ParserWarning:
+            raise ValueError("rows have more values than there are columns") from None
+    return table.rename(columns=lambda name: str(name).strip().lower())
 
 
 def undisturbed(trials: pd.DataFrame) -> pd.DataFrame:

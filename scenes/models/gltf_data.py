@@ -13,6 +13,7 @@ import io
 import json
 import struct
 from typing import Any
+from urllib.parse import unquote_to_bytes
 
 import numpy as np
 from numpy.typing import NDArray
@@ -92,8 +93,11 @@ class GltfData:
     def resource(self, uri: str, place: str, what: str) -> bytes:
         """The bytes of a URI: embedded data, or a file beside it."""
         if uri.startswith("data:"):
+            kind, _, data = uri.partition(",")
+            if not kind.endswith(";base64"):  # escapes, which RFC 2397 has in its place
+                return unquote_to_bytes(data)
             try:
-                return base64.b64decode(uri.partition(",")[2])
+                return base64.b64decode(data)
             except ValueError:
                 raise SceneError(f"cannot be read: {place}.uri: expected data in base64") from None
         return self.sources.require(uri, what).read_bytes()

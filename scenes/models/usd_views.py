@@ -106,7 +106,12 @@ def light_of(
     if normalized:
         radiance = radiance / area
     point = kind == "SphereLight" and bool(_value(prim, "treatAsPoint", None, False))
-    if float(_value(prim, "shaping:cone:angle", code, 90.0)) < 90.0:
+    cone_deg = float(_value(prim, "shaping:cone:angle", code, 180.0))
+    if 90.0 <= cone_deg < 180.0 and kind == "SphereLight":
+        # programs write 90, the usual value, to lamps without a cone
+        what, became = f"a cone of {cone_deg:g} degrees of a SphereLight", "light to all sides"
+        report.add(name, what, became, picture=cone_deg != 90.0)
+    if cone_deg < 90.0:
         if not point:
             report.add(name, f"the extent of a {kind} with a cone", "a spot")
         return _spot(prim, code, matrix, radiance * area / (4.0 if kind == "SphereLight" else 1.0)), None

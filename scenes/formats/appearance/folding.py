@@ -170,7 +170,7 @@ def _mean(texture: Texture, again: Callable[[Texture], Rgb]) -> Rgb:
 
 
 def within_one(value: Rgb, where: str, report: LossReport) -> Rgb:
-    """A reflectance for targets that refuse those outside of [0, 1], which is reported."""
+    """A reflectance for targets that refuse or change those outside of [0, 1], which is reported."""
     if max(value) <= 1.0 and min(value) >= 0.0:
         return value
     beyond = max(value) if max(value) > 1.0 else min(value)

@@ -34,5 +34,6 @@ def check_numbers(points: NDArray, faces: NDArray, normals: NDArray | None, uvs:
     for what, array in (("vertices", points), ("normals", normals), ("texture coordinates", uvs)):
         if array is not None and not (np.abs(array) < 1e30).all():
             raise SceneError(f"{name}: expected finite {what}")
-    if len(faces) and not ((faces >= 0) & (faces < len(points))).all():
-        raise SceneError(f"{name}: expected indices below {len(points)}, got {faces.max():g}")
+    wrong = ~((faces >= 0) & (faces < len(points)))
+    if wrong.any():
+        raise SceneError(f"{name}: expected indices from 0 to {len(points) - 1}, got {faces[wrong][0]:.15g}")

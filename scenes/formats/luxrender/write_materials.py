@@ -24,20 +24,22 @@ from scenes.canonical import (
     MixMaterial,
     Phong,
     Plastic,
+    Rgb,
     Texture,
     Translucent,
     Uber,
 )
 from scenes.formats.appearance.facets import Facets
-from scenes.formats.appearance.folding import is_binary, mean_of, product_of
+from scenes.formats.appearance.folding import is_binary, mean_of, product_of, within_one
 from scenes.formats.appearance.indices import reflectance_of_index
 from scenes.formats.appearance.mixtures import NOTHING, added_coat, dimmed, is_nothing, lets_through, lobes_of
 from scenes.formats.appearance.spectra import METALS, grey, rgb
-from scenes.formats.directives.surface_writer import SurfaceWriter, mixture_line
+from scenes.formats.directives.surface_writer import Kind, SurfaceWriter, mixture_line
 from scenes.formats.directives.textures import Pair
 from scenes.formats.geometry.conventions import first_row_below
 from scenes.formats.text.numbers import listed, number
 
+_REFLECTANCES = ("Kd", "Ks", "Kr", "Kt")
 _METAL_NAMES = {"Ag": "silver", "Al": "aluminium", "Au": "gold", "Cu": "copper"}
 
 
@@ -49,6 +51,11 @@ class LuxSurfaceWriter(SurfaceWriter):
     color = "color"
     checkerboard_end = ' "integer dimension" [ 2 ] "string mapping" [ "uv" ]'
     _null: Matte | None = None
+
+    def constant(self, name: str, value: Rgb, kind: Kind = "color") -> str:
+        """A constant parameter; LuxRender and LuxCore take reflectances above 1 for 1."""
+        bounded = kind == "color" and name in _REFLECTANCES
+        return super().constant(name, within_one(value, name, self.report) if bounded else value, kind)
 
     def image_line(self, texture: ImageTexture) -> str:
         image, scale, offset = self._placed_alike(texture)

@@ -34,7 +34,11 @@ class Properties:
     def __post_init__(self) -> None:
         for child in self.node.children:
             if child.tag in PROPERTIES:
-                self.given.setdefault(child.get("name"), child)
+                name = child.get("name")
+                if name in self.given:  # Mitsuba 0.5 warns and takes the last; Mitsuba 3 refuses the file
+                    what = f"{self.node.get('type')}: several values of {name!r}"
+                    self.report.hint(str(child.place), what, "the last")
+                self.given[name] = child
             else:
                 self.rest.append(child)
 

@@ -73,7 +73,8 @@ class ElementWriter:
             self._folded[id(texture)] = texture, folded(texture)
         texture = self._folded[id(texture)][1]
         if isinstance(texture, ConstantTexture):
-            value = within_one(texture.value, name, self.report) if self.modern else texture.value
+            bounded = self.modern or name.endswith(("eflectance", "ransmittance"))  # others may be above 1 in 0.5
+            value = within_one(texture.value, name, self.report) if bounded else texture.value
             self.color(parent, name, value)
             return
         if isinstance(texture, ImageTexture):

@@ -148,8 +148,42 @@ def test_csv_as_spreadsheets_write_it(encoding: str, between: str, tmp_path: Pat
     assert trials[["observer", "samples", "correct"]].to_numpy().tolist() == [["é", 8, True]]
 
 
-def test_columns_that_differ_in_case_alone_are_refused(tmp_path: Path) -> None:
+HEAD = "observer,samples,correct\n"
+
+
+@pytest.mark.parametrize(
+    ("text", "expected"),
+    [
+        (HEAD + '"a ""b"", c",8,yes\n', [['a "b", c', 8, True]]),
+        (HEAD + "A,8,yes,\nB,16,no,\n", [["A", 8, True], ["B", 16, False]]),  # separators at ends of rows alone
+        ("sep=;\n" + HEAD.replace(",", ";") + "A;8;yes\n", [["A", 8, True]]),
+        (HEAD.replace("\n", "\r") + "A,8,yes\rB,16,no\r", [["A", 8, True], ["B", 16, False]]),
+        ('observer,samples,correct,"what; they; said; then"\nA,8,yes,x\n', [["A", 8, True]]),
+        (HEAD + "007,8,yes\n7,8,no\n1.0,8,no\n", [["007", 8, True], ["7", 8, False], ["1.0", 8, False]]),
+        (HEAD + "NA,8,yes\nNone,8,NA\nnull,8,no\n", [["NA", 8, True], ["null", 8, False]]),
+    ],
+)
+def test_names_and_ends_of_rows_of_csv_are_what_they_say(text: str, expected: list, tmp_path: Path) -> None:
+    """Observers 007 and 7 are two, and NA may be one."""
     path = tmp_path / "a.csv"
-    path.write_text("observer,samples,Samples,correct\na,8,16,yes\n")
+    path.write_bytes(text.encode())
+    trials, _ = read_trials([path])
+    assert trials[["observer", "samples", "correct"]].to_numpy().tolist() == expected
+
+
+def test_tables_that_say_two_things_are_refused(tmp_path: Path) -> None:
+    path = tmp_path / "a.csv"
+    path.write_text(HEAD + "A,8,yes,x\nB,8,yes,y\n")
+    with pytest.raises(InputError, match="rows have more values than there are columns"):
+        read_trials([path])
+    path.write_text(HEAD + "A,8,yes\n")
+    with pytest.raises(InputError, match=r"expected different tables, got .*a\.csv twice"):
+        read_trials([path, path])
+
+
+@pytest.mark.parametrize("name", ["Samples", "samples"])
+def test_columns_that_differ_in_case_alone_are_refused(name: str, tmp_path: Path) -> None:
+    path = tmp_path / "a.csv"
+    path.write_text(f"observer,samples,{name},correct\na,8,16,yes\n")
     with pytest.raises(InputError, match=r"a\.csv: cannot be read as CSV \(two columns samples\)"):
         read_trials([path])

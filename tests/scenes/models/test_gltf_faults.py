@@ -136,7 +136,7 @@ def test_each_value_of_a_file_replaced_gives_a_scene_or_one_line(part: str, tmp_
         ("accessors 1 componentType", 5125, "accessors[1]: expected 6 elements of 4 bytes at 0, got 12 bytes"),
         ("bufferViews 0 byteLength", 99, "bufferViews[0]: expected 99 bytes of buffer 0 at 0, got 48"),
         ("bufferViews 0 byteStride", 4, "accessors[0]: expected 4 elements of 12 bytes every 4 at 0, got 48 bytes"),
-        ("buffers 0 uri", "data:,A", "buffers[0].uri: expected data in base64"),
+        ("buffers 0 uri", "data:;base64,A", "buffers[0].uri: expected data in base64"),
         ("meshes 0 primitives 0 attributes NORMAL", 1, "accessors[1].type: expected VEC3 for NORMAL, got SCALAR"),
         ("meshes 0 primitives 0 indices", 0, "accessors[0].componentType: expected 5121, 5123 or 5125 for indices, "
          "got 5126"),

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import base64
 import json
 import math
 import struct
 from pathlib import Path
 from typing import Any
+from urllib.parse import quote_from_bytes
 
 import numpy as np
 import pytest
@@ -240,3 +242,13 @@ def test_faults_are_named_in_one_line(change: dict[str, Any], message: str, tmp_
         with pytest.raises(SceneError, match=message) as caught:
             read_model(path)
         assert "\n" not in str(caught.value) and str(path) in str(caught.value)
+
+
+def test_embedded_data_may_be_escapes(tmp_path: Path) -> None:
+    """They are base64 only where their type says so."""
+    file = Gltf(tmp_path)
+    for buffer in file.json["buffers"]:
+        content = base64.b64decode(buffer["uri"].partition(",")[2])
+        buffer["uri"] = "data:application/octet-stream," + quote_from_bytes(content)
+    (part,) = read_model(file.written())
+    assert sorted(part.shape.vertices.tolist()) == sorted(map(list, QUAD)) and len(part.shape.faces) == 2

@@ -123,3 +123,13 @@ def test_an_environment_with_other_primaries_becomes_rec_709(space: str, expecte
     dome = f'def DomeLight "d" {{ float inputs:intensity = 1\nasset inputs:texture:file = @{file.name}@ {space} }}\n'
     (light,) = read_whole(written(tmp_path, mesh() + dome)).lights
     assert isinstance(light, EnvironmentLight) and light.image[0, 0] == pytest.approx(expected, abs=1e-4)
+
+
+@pytest.mark.parametrize(("cone", "changes"), [("", None), ("90", False), ("120", True), ("180", None)])
+def test_a_wide_cone_of_a_lamp_is_said(cone: str, changes: bool | None, tmp_path: Path) -> None:
+    shaped = f"float inputs:shaping:cone:angle = {cone}" if cone else ""
+    report = LossReport()
+    lamp = f'def SphereLight "l" {{ bool treatAsPoint = 1\n{shaped} }}'
+    whole = read_whole(written(tmp_path, mesh() + lamp), report)
+    assert isinstance(whole.lights[0], PointLight)
+    assert [loss.picture for loss in report.losses if "a cone" in loss.what] == ([] if changes is None else [changes])

@@ -9,7 +9,7 @@ import pytest
 from PIL import Image
 
 from scenes.arithmetic import norm
-from scenes.canonical import OrthographicCamera
+from scenes.canonical import ConstantTexture, Matte, OrthographicCamera
 from scenes.formats.conversion import load_scene_file
 from scenes.formats.geometry.transform_stack import rotation
 from scenes.formats.losses import LossReport
@@ -76,3 +76,15 @@ def test_scaled_lights_are_named(kind: str, scale: str, lost: str | None, tmp_pa
     assert [loss.what for loss in report.losses] == ([lost] if lost else [])
     if kind == "envmap":
         assert norm(scene.lights[0].to_world[:3, 0]) == pytest.approx(1.0)
+
+
+def test_of_repeated_properties_the_last_counts(tmp_path: Path) -> None:
+    """Mitsuba 0.5 overwrites a property with a warning."""
+    color = '<rgb name="reflectance" value="{0} {0} {0}"/>'
+    body = f'<bsdf type="diffuse">{color.format(0.25)}{color.format(0.5)}</bsdf>'
+    report = LossReport()
+    scene = _scene(tmp_path, f'<shape type="sphere">{body}</shape>', report)
+    assert scene.instances[0].material == Matte(ConstantTexture((0.5, 0.5, 0.5)))
+    assert [(loss.what, loss.became, loss.picture) for loss in report.losses] == [
+        ("diffuse: several values of 'reflectance'", "the last", False)
+    ]
