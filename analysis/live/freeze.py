@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from analysis.live.overlays import codes
+from analysis.live.overlays import Key, codes
 from analysis.metrics import METRICS
 from analysis.metrics.quality import encode, pixel_errors
 from analysis.page.pictures import PagePixels, palette
@@ -23,7 +23,12 @@ TRUTH, SIGNED, SQUARED = "truth", "signed error", "squared error"
 VIEWS = (TRUTH, SIGNED, SQUARED)
 """What a side can show in place of its picture while a moment is held."""
 _SIGNED, _SQUARED = 0.25, (1e-5, 0.1)  # bounds of their colour scales
-SAID = {SIGNED: "luminance of the error, −0.25 to 0.25", SQUARED: "sum over channels, 1e-5 to 0.1"}
+_PALETTES = {SIGNED: "RdBu_r", SQUARED: "inferno"}
+KEYS = {
+    SIGNED: Key("luminance of the error, −0.25 to 0.25", _PALETTES[SIGNED]),
+    SQUARED: Key("sum over channels, 1e-5 to 0.1", _PALETTES[SQUARED]),
+}
+"""What their colours mean."""
 
 
 @dataclass(frozen=True)
@@ -51,10 +56,10 @@ class Frozen:
         apart = (encode(self.pictures[side]) - encode(self.pictures[TRUTH])).numpy()
         if view == SIGNED:
             share = (apart @ np.array(LUMINANCE) + _SIGNED) / (2 * _SIGNED)
-            return palette("RdBu_r")[np.clip(share * 255.0 + 0.5, 0, 255).astype(np.int64)]
+            return palette(_PALETTES[SIGNED])[np.clip(share * 255.0 + 0.5, 0, 255).astype(np.int64)]
         low, high = np.log(_SQUARED)
         share = (np.log(np.maximum(np.square(apart).sum(axis=-1), _SQUARED[0])) - low) / (high - low)
-        return palette("inferno")[np.clip(share * 255.0 + 0.5, 0, 255).astype(np.int64)]
+        return palette(_PALETTES[SQUARED])[np.clip(share * 255.0 + 0.5, 0, 255).astype(np.int64)]
 
 
 def held(engine: Engine) -> Frozen:

@@ -10,11 +10,11 @@ from dataclasses import asdict, dataclass, field, replace
 from typing import Any
 
 from analysis.live.engine import SIDES, Engine
-from analysis.live.freeze import SAID, VIEWS, Frozen
-from analysis.live.overlays import PLAIN, codes, laid_over, mean_newest_s, overlays, predicted_error
+from analysis.live.freeze import KEYS, VIEWS, Frozen
+from analysis.live.overlays import PLAIN, Key, codes, laid_over, mean_newest_s, overlays, predicted_error
 from analysis.live.requests import REQUESTS, standing
 from analysis.live.runner import DisplayState, Runner
-from analysis.page.pictures import ColorScale, PagePixels, number
+from analysis.page.pictures import PagePixels
 from analysis.page.video import AGES
 from tsar.checks import require
 
@@ -119,7 +119,8 @@ class Hub:
                 key = run, seen.number, overlay, display.strength, frozen, moment
                 if watcher.sent.get(side) != key:
                     watcher.sent[side] = key
-                    pixels, facts["scale"] = self._pixels(side, key, seen, known, frozen)
+                    pixels, meaning = self._pixels(side, key, seen, known, frozen)
+                    facts |= {"scale": meaning.scale, "colours": meaning.colours}
                     facts |= {"height": pixels.shape[0], "width": pixels.shape[1], "bytes": pixels.nbytes}
                     pictures.append(pixels.tobytes())
         header = json.dumps(
@@ -136,23 +137,23 @@ class Hub:
 
     def _pixels(
         self, side: str, key: Any, seen: DisplayState, known: Mapping[str, Any], frozen: Frozen | None
-    ) -> tuple[PagePixels, str]:
+    ) -> tuple[PagePixels, Key]:
         """Pixels of a side, and what their colours mean; those that another page was sent are not made again."""
         overlay, strength = key[2], key[3]
         before = self._drawn.get(side)
         if before is not None and before[0] == key:
             return before[1]
         if frozen is not None and overlay in VIEWS and side in frozen.errors:
-            found = frozen.drawn(side, overlay), SAID.get(overlay, "")
+            found = frozen.drawn(side, overlay), KEYS.get(overlay, Key())
         elif overlay in known:
             picture = codes(seen.shown[1].image)
             try:
                 one = known[overlay]()
-                found = laid_over(picture, one, strength), _scale(one.scale)
+                found = laid_over(picture, one, strength), Key.of(one.scale)
             except Exception as error:  # a map may be anybody's: the picture is shown without it
-                found = picture, f"cannot be drawn ({one_line(error)})"
+                found = picture, Key(f"cannot be drawn ({one_line(error)})")
         else:
-            found = codes(seen.shown[1].image), ""
+            found = codes(seen.shown[1].image), Key()
         self._drawn[side] = key, found
         return found
 
@@ -197,10 +198,6 @@ class Hub:
 def _finite(facts: Mapping[str, Any]) -> dict[str, Any]:
     """With None for numbers that JSON cannot hold."""
     return {name: None if isinstance(one, float) and not math.isfinite(one) else one for name, one in facts.items()}
-
-
-def _scale(scale: ColorScale) -> str:
-    return f"{number(scale.shown[0])} to {number(scale.shown[1])} {scale.unit}"
 
 
 def one_line(error: Exception) -> str:

@@ -127,6 +127,9 @@ function show(header) {
     options(select, [...new Set([...(facts.overlays || ["none"]), chosen])]);
     if (document.activeElement !== select) select.value = chosen;
     part(`${side}-said`).textContent = said(side, facts, header);
+    const key = part(`${side}-key`);
+    if (facts.colours) key.style.background = facts.colours.length ? `linear-gradient(to right, ${facts.colours})` : "";
+    key.hidden = !key.style.background;
   }
   part("freeze").textContent = frozen ? "go on" : "freeze and compare with the truth";
   part("freeze").setAttribute("aria-pressed", String(Boolean(frozen)));

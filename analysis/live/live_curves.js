@@ -37,7 +37,7 @@ const Curves = (() => {
     const top = Math.ceil(most / step) * step;
     const x = (t) => 34 + 270 * (1 - (time - t) / SPAN_S);
     const y = (value) => 98 - 88 * (value / top);
-    const parts = [0, top].map((value) => [
+    const parts = (values.length ? [0, top] : []).map((value) => [
       element("line", { x1: 34, x2: 304, y1: y(value), y2: y(value), class: "grid" }),
       element("text", { x: 30, y: y(value) + 4, "text-anchor": "end" }, Number(value.toPrecision(2))),
     ]).flat();

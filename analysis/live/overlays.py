@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from dataclasses import dataclass
 from functools import lru_cache, partial
 
 import numpy as np
@@ -21,6 +22,8 @@ from analysis.page.pictures import (
     age_map,
     density_map,
     enlarge,
+    number,
+    palette,
     stored,
     tiling_map,
 )
@@ -32,6 +35,29 @@ TILING, SPATIAL, TEMPORAL = "tiling by refresh rate", "spatial density", "tempor
 EXPECTED = "expected error"
 """The map of :class:`tsar.policies.filter.Filter` from which the curve of predicted error comes."""
 _AGES_S = 1e-3, 10.0
+
+
+@dataclass(frozen=True)
+class Key:
+    """What the colours of a picture mean.
+
+    Attributes:
+        scale: the values at both ends of the palette with their unit, in words; empty where colours are those seen.
+        palette: name of the palette; empty where there is none.
+    """
+
+    scale: str = ""
+    palette: str = ""
+
+    @classmethod
+    def of(cls, scale: ColorScale) -> Key:
+        """That of a map."""
+        return cls(f"{number(scale.shown[0])} to {number(scale.shown[1])} {scale.unit}", scale.palette)
+
+    @property
+    def colours(self) -> list[str]:
+        """Colours from the low end of the palette to the high one, as a style sheet has them."""
+        return [f"#{bytes(one).hex()}" for one in palette(self.palette)[::17]] if self.palette else []
 
 
 @lru_cache(maxsize=1)

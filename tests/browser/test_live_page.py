@@ -113,6 +113,9 @@ def test_controls_act(page: Page, hub: Hub) -> None:
     page.locator("#strength").fill("1")
     expect(page.locator("#right-said")).to_contain_text("samples per element", timeout=PATIENCE_MS)
     assert apart(before, settled(page)) > 5
+    assert "gradient" in page.locator("#right-key").evaluate("one => getComputedStyle(one).backgroundImage")
+    expect(page.locator("#right-key")).to_be_visible()
+    expect(page.locator("#left-key")).to_be_hidden()
     page.locator("#c-batch").fill("7")
     expect(page.locator("#note")).to_contain_text("batch_size", timeout=PATIENCE_MS)
     page.locator("#c-batch").blur()
