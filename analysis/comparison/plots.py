@@ -84,15 +84,16 @@ def stage_figure(modelled: Mapping[str, float], measured: Mapping[str, float]) -
     names = list(dict.fromkeys((*modelled, *measured)))
     figure, (axis,) = new_figure(9.0, 2.8)
     place = np.arange(len(names))
-    for shift, (values, ink, label) in zip(
-        (-0.2, 0.2), ((modelled, FRAMED, "modelled operations"), (measured, ADAPTIVE, "measured seconds")), strict=True
+    for shift, values, ink, hatch, label in (
+        (-0.2, modelled, FRAMED, "//", "modelled operations"),
+        (0.2, measured, ADAPTIVE, "", "measured seconds"),
     ):
         total = sum(values.values()) or 1.0
         share = [100.0 * values.get(name, 0.0) / total for name in names]
-        bars = axis.bar(place + shift, share, 0.38, color=ink, label=label)
+        bars = axis.bar(place + shift, share, 0.38, color=ink, hatch=hatch, edgecolor="white", linewidth=0, label=label)
         axis.bar_label(bars, fmt="%.1f", fontsize=7, padding=1)
     axis.set_xticks(place, names)
     axis.set_ylabel("share of a cycle, %")
     axis.set_ylim(0, 108)
-    axis.legend(frameon=False, fontsize=8)
+    figure.legend(frameon=False, fontsize=8, ncols=2, loc="outside upper left")
     return figure

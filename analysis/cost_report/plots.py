@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.ticker import MaxNLocator
+from matplotlib.ticker import LogLocator, MaxNLocator
 
 from analysis.page.figures import ADAPTIVE, FRAMED, INKS, label_ends, line_style, save
 from analysis.storage.files import atomic
@@ -163,24 +163,27 @@ def scaling_figure(cells: Sequence[Cell], laws: Mapping[str, PowerLaw], centre: 
         ):
             law = laws[f"{name}_by_{against}"]
             line = np.geomspace(law.low, law.high, 64)
-            label = f"{name}: exponent {law.exponent:.2f}, spread {100 * law.spread:.0f} %"
+            label = f"{name}: exponent {law.exponent:.2f} (±{100 * law.spread:.0f} %)"
             axis.plot(x, 1e3 * np.array(values), mark, color=ink, markersize=5, label="_measured")
             axis.plot(line, 1e3 * law.factor * line**law.exponent, color=ink, linewidth=1.0, linestyle=dash,
                       label=label)  # fmt: skip
             straight = 1e3 * np.array([law.linear(value) for value in line])
             axis.plot(line, np.where(straight > 0, straight, np.nan), color=ink, linewidth=1.0, linestyle=":",
-                      label="_straight")  # fmt: skip
+                      label=f"{name}: straight line")  # fmt: skip
         axis.set_yscale("log")
         axis.set_ylabel("ms per cycle")
+        axis.yaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
         axis.yaxis.set_major_formatter("{x:g}")
-        axis.legend(frameon=False, fontsize=8, loc="upper left")
-        axis.set_ylim(top=axis.get_ylim()[1] * 1.8)
+        axis.yaxis.set_minor_formatter("")
     left.set_xscale("log", base=2)
     left.xaxis.set_major_formatter("{x:g}")
     left.set_xlabel(f"{_AXES['batch_size']}, at {centre[1]}²")
     _resolution_axis(right)
     right.set_xlabel(f"{_AXES['recon_res']}, at batch {centre[0]}")
-    figure.suptitle("Wall time of a cycle (dotted: straight line with a fixed cost)", fontsize=10, x=0.01, ha="left")
+    figure.suptitle("Wall time of a cycle, with power laws and straight lines of a fixed cost", fontsize=10, x=0.01,
+                    ha="left")  # fmt: skip
+    for axis in (left, right):
+        label_ends(axis)
     return figure
 
 

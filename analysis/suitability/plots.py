@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import LogLocator
 
 from analysis.metrics.quality import WHISKERS, percentile
-from analysis.page.figures import ADAPTIVE, FRAMED, GRID, INKS, dashed, label_ends, new_figure, save
+from analysis.page.figures import ADAPTIVE, FRAMED, GRID, INKS, dashed, ink_of, label_ends, new_figure, save
 from analysis.study.cases import ROWS, Case
 from analysis.study.evaluation import Resources
 from analysis.study.inputs import INPUTS
@@ -193,26 +193,23 @@ def errors(results: Results, name: str) -> Figure | None:
         ours = [one for one in found if one.run.side_px == side and one.run.label == "thesis"]
         ours.sort(key=lambda one: ROWS[one.run.row or 0][0])
         for place, one in enumerate(ours):
-            ink, label = _shade(place, len(ours)), setting(one.run)
-            axis.plot(one.times["time_s"], _positive(one.times["mse"]), color=ink, linewidth=0.9, label=label,
-                      linestyle=dashed(place, 0.9))  # fmt: skip
+            style = place + (place > 0)  # the second ink is that of framed
+            axis.plot(one.times["time_s"], _positive(one.times["mse"]), color=INKS[ink_of(style)], linewidth=0.9,
+                      linestyle=dashed(style, 0.9), label=setting(one.run))  # fmt: skip
         for one in found:
             if one.run.side_px == side and one.run.label == "framed":
                 _refreshes(axis, one)
                 axis.plot(one.times["time_s"], _positive(one.times["mse"]), color=FRAMED, linewidth=2.4, label="framed")
         axis.set_yscale("log")
+        axis.yaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
+        axis.yaxis.set_major_formatter("{x:g}")
+        axis.yaxis.set_minor_formatter("")
         axis.set_title(f"{name}, {side}²", loc="left", fontsize=10)
         axis.set_ylabel("mean squared error")
     axes[-1].set_xlabel("simulated time, s")
     for axis in axes:
         label_ends(axis)
     return figure
-
-
-def _shade(place: int, count: int) -> Any:
-    import matplotlib
-
-    return matplotlib.colormaps["autumn"](0.6 * place / max(count - 1, 1))
 
 
 def ratio_over_time(results: Results, row: int) -> Figure | None:

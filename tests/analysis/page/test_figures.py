@@ -12,6 +12,7 @@ from matplotlib.figure import Figure
 from matplotlib.text import Text
 from PIL import Image, ImageColor
 
+from analysis.comparison.plots import stage_figure
 from analysis.page.figures import (
     DASHES,
     INKS,
@@ -72,6 +73,21 @@ def test_inks_are_of_one_place() -> None:
             if isinstance(node, ast.Constant) and isinstance(node.value, str) and node.value.startswith("#"):
                 found += [f"{name}:{node.lineno}"] * (len(node.value) == 7 and name != SHARED)
     assert not found
+
+
+def test_no_line_has_the_ink_of_a_map() -> None:
+    """A colour map is of pictures: a line that takes its ink there is none of those that all can tell apart."""
+    found = [name for name, tree in modules() for node in ast.walk(tree)
+             if isinstance(node, ast.Attribute) and node.attr == "colormaps"]  # fmt: skip
+    assert set(found) == {"page/pictures.py", "spectrum/plots.py"}
+
+
+def test_no_legend_lies_within_the_axes_of_bars() -> None:
+    """A bar may be as high as its axes."""
+    drawn = stage_figure({"tracing": 4.0, "all others": 96.0}, {"tracing": 96.0, "all others": 4.0})
+    assert [text.get_text() for text in drawn.legends[0].get_texts()] == ["modelled operations", "measured seconds"]
+    assert drawn.axes[0].get_legend() is None
+    assert len({bar.get_hatch() for bars in drawn.axes[0].containers for bar in bars.patches}) == 2  # type: ignore[attr-defined]
 
 
 def test_no_line_has_the_ink_of_a_cycle() -> None:
