@@ -101,6 +101,11 @@ class SpectrumOptions:
         require(-3 <= start_s <= 6 - self.span_s, "ideal_start_s", "within the animation, from -3 to 6 s", start_s)
         require(0 < self.tau < 1, "tau", "a share in (0, 1)", self.tau)
 
+    @property
+    def sampled(self) -> list[int]:
+        """Samples along a pixel's side of the frames whose slopes are compared: one, and those of the option."""
+        return sorted({1, self.samples_per_axis})
+
     def does(self, part: Part) -> bool:
         """Whether a part is to be run."""
         return self.only in (None, part)

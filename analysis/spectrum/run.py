@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 from analysis.command.cli import bad_input, full_disk, require_memory
@@ -75,19 +76,25 @@ def _pictures(options: SpectrumOptions) -> list[Spectrum]:
 
 def _slopes(options: SpectrumOptions, pictures: list[Spectrum], shown_bars: Bars) -> dict[str, Any]:
     levels = options.tsar.level_max - options.tsar.level_min + 1
-    task = shown_bars.task("slopes", len(options.inputs) * (2 * options.frames_per_input + levels))
+    frames = len(options.sampled) * options.frames_per_input
+    task = shown_bars.task("slopes", len(options.inputs) * (frames + levels))
     own = [spectrum for name in options.inputs for spectrum in input_spectra(options, name, task)]
     groups = list(dict.fromkeys(spectrum.group for spectrum in own))
     ordered = pictures + sorted(own, key=lambda spectrum: groups.index(spectrum.group))
     save(plots.slope_figure(ordered), options.out / "slopes.png")
-    one_each = list({s.source: s for s in reversed(own) if s.group == groups[1]}.values())[::-1]
-    examples = [*pictures[:_EXAMPLES], *one_each][: 2 * _EXAMPLES]
+    examples = [*pictures[:_EXAMPLES], *first_of_each(own)][: 2 * _EXAMPLES]
     save(plots.example_spectra_figure(examples), options.out / "spectra.png")
     rows = [
         {"name": s.name, "group": s.group, "source": s.source, "slope": s.slope, "slope_linear": s.slope_linear}
         for s in ordered
     ]
     return {"groups": group_statistics(ordered), "spectra": rows}
+
+
+def first_of_each(spectra: Sequence[Spectrum]) -> list[Spectrum]:
+    """The first frame of each input, of those with the most samples a pixel, which are the last with pictures."""
+    frames = [one for one in spectra if one.picture is not None]
+    return list({one.source: one for one in reversed(frames) if one.group == frames[-1].group}.values())[::-1]
 
 
 def _ideal(options: SpectrumOptions, shown_bars: Bars) -> dict[str, Any]:

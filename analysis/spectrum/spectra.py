@@ -151,7 +151,7 @@ def input_spectra(options: SpectrumOptions, name: str, task: Task) -> Iterator[S
     times_s = (np.arange(options.frames_per_input) + 0.5) * duration_s / options.frames_per_input
     side, levels = options.tsar.resolution_px, range(options.tsar.level_min, options.tsar.level_max + 1)
     for time_s in times_s:
-        for axis in (1, options.samples_per_axis):
+        for axis in options.sampled:
             color = renderer.render_frame(float(time_s), side, side, axis).numpy()
             names = {"name": f"{name} {time_s:.2f} s", "group": f"frames, {axis}² samples a pixel", "source": name}
             yield spectrum_of(squares, color, **names, picture=shown(color))

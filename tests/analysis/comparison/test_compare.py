@@ -165,7 +165,7 @@ def test_a_picture_is_one_call() -> None:
     assert found.shape == (32, 48, 3) and found.dtype == np.float32 and 0.01 < found.mean() < 10.0
     np.testing.assert_array_equal(found, render(load_scene("moving-object"), (48, 32), samples_per_pixel=4, threads=1))
     assert (found != render("moving-object", (48, 32), samples_per_pixel=4, point_set="sobol")).any()
-    with pytest.raises(ConfigError, match="point set: expected one of"):
+    with pytest.raises(ConfigError, match="point_set: expected one of"):
         render("glass", 32, point_set="soboll")
     with pytest.raises(ConfigError, match="size: expected at least one pixel, got 0"):
         render("glass", 0)

@@ -11,6 +11,7 @@ from PIL import Image
 
 from analysis.command.cli import InputError
 from analysis.spectrum.options import SpectrumOptions
+from analysis.spectrum.run import first_of_each
 from analysis.spectrum.spectra import (
     Spectrum,
     fit_slope,
@@ -178,7 +179,7 @@ def test_statistics_of_groups() -> None:
     [
         ({"inputs": ("car",)}, "inputs"),
         ({"inputs": ()}, "inputs"),
-        ({"input": "car"}, "inputs"),
+        ({"input": "car"}, "input: expected one of"),
         ({"frames_per_input": 0}, "frames_per_input"),
         ({"samples_per_axis": 17}, "samples_per_axis"),
         ({"ideal_samples": 100}, "ideal_samples"),
@@ -207,3 +208,15 @@ def test_parts_and_cycle() -> None:
     assert SpectrumOptions().does("slopes") and SpectrumOptions(only="ideal").does("ideal")
     assert not SpectrumOptions(only="ideal").does("agreement")
     assert SpectrumOptions(tsar=TsarConfig(batch_size=256)).cycle_s() > SpectrumOptions().cycle_s() > 0.0
+
+
+@pytest.mark.parametrize(("axis", "groups"), [(1, ["frames, 1²"]), (4, ["frames, 1²", "frames, 4²"])])
+def test_examples_are_frames_with_the_most_samples(axis: int, groups: list[str]) -> None:
+    """With one sample a pixel there is one group of frames; framelets, which follow, have no pictures."""
+    assert len(SpectrumOptions(samples_per_axis=axis).sampled) == len(groups)
+    picture = np.zeros((4, 4, 3), np.uint8)
+    names = [(f"{source} {time}", group, source) for source in ("b", "a") for time in (0, 1) for group in groups]
+    blank = {"power": np.ones(4), "slope": -2.0, "slope_linear": -2.0, "offset": 0.0}
+    own = [Spectrum(name=name, group=group, source=source, picture=picture, **blank) for name, group, source in names]
+    own += [Spectrum(name="b", group="framelets, level 2", source="b", **blank)]
+    assert [(one.name, one.group) for one in first_of_each(own)] == [("b 0", groups[-1]), ("a 0", groups[-1])]
