@@ -4,8 +4,11 @@ from __future__ import annotations
 
 import socket
 from pathlib import Path
+from typing import Any
 
 import pandas as pd
+import pytest
+from axe_playwright_python.sync_playwright import Axe
 from playwright.sync_api import Browser, Page, expect
 
 from analysis.perception.protocol import TABLE, TrialSession
@@ -167,3 +170,21 @@ def test_pairs_are_seen_in_turn_where_four_pictures_do_not_fit(browser: Browser,
         table = session.table()
         assert table["videos"].tolist() == [2, 2, 2, 4] and table["fits_window"].all() and table["correct"][:2].all()
     page.close()
+
+
+@pytest.mark.parametrize(("width", "scheme"), [(1440, "light"), (1024, "dark"), (390, "light")])
+def test_no_rule_of_axe_is_broken(browser: Browser, tmp_path: Path, width: int, scheme: Any) -> None:
+    """Neither where the rules of the session are told, nor in a trial."""
+    session = TrialSession(tmp_path / "session", write_stimuli(tmp_path / "stimuli"), "anna", 1, 0)
+    context = browser.new_context(viewport={"width": width, "height": 800}, color_scheme=scheme, bypass_csp=True)
+    page = context.new_page()
+    with serving(session, free_port(), break_every=100) as address:
+        page.goto(address)
+        expect(page.locator("#message")).to_contain_text("Press the")
+        for key, shown in (("", "#message"), ("Space", "#pairs")):
+            if key:
+                page.keyboard.press(key)
+            expect(page.locator(shown)).to_be_visible(timeout=10_000)
+            found = Axe().run(page)
+            assert found.violations_count == 0, found.generate_report()
+    context.close()
