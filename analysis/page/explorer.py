@@ -16,17 +16,25 @@ from analysis.page.comparer import source
 
 SCRIPT = Path(__file__).with_name("explorer_page.js")
 
+SHAPES = (
+    "M0-6L5.6 4.4H-5.6Z",
+    "M-5 0a5 5 0 1 0 10 0a5 5 0 1 0-10 0Z",
+    "M-4.5-4.5H4.5V4.5H-4.5Z",
+    "M0-6.2L6.2 0L0 6.2L-6.2 0Z",
+)
+"""Marks of the kinds in turn, as paths of SVG about their middle: kinds can be told apart in grey, too."""
+
 STYLE = """
 .explorer{display:grid;grid-template-columns:minmax(0,1fr) 280px;gap:16px} .explorer select{font:inherit;max-width:100%}
 .explorer .choices{grid-column:1/-1;display:flex;flex-wrap:wrap;gap:.3em 1.2em} .explorer svg{width:100%;height:auto;
 font-size:12px;display:block} .explorer svg text{fill:var(--soft)} .explorer .grid{stroke:var(--line)}
 .explorer .front{fill:none;stroke:var(--ink);stroke-width:1.4}
-.explorer circle{cursor:pointer;stroke:var(--paper);stroke-width:.7}
-.explorer circle:focus{outline:none;stroke:var(--ink);stroke-width:2}
+.explorer .dot{cursor:pointer;stroke:var(--paper);stroke-width:.7}
+.explorer .dot:focus{outline:none;stroke:var(--ink);stroke-width:2}
 .explorer .picked{stroke:var(--ink);stroke-width:2}
 .explorer .beside img{width:100%;image-rendering:pixelated;display:block;background:#181818;margin:.3em 0}
 .explorer .beside{font-size:13px} .explorer .legend span{margin-right:1em;white-space:nowrap}
-.explorer .legend i{display:inline-block;width:.8em;height:.8em;border-radius:50%;margin-right:.3em}
+.explorer .legend svg{display:inline;width:1em;height:1em;margin-right:.3em;vertical-align:-.1em}
 @media(max-width:760px){.explorer{grid-template-columns:minmax(0,1fr)}}
 """
 
@@ -57,7 +65,7 @@ class Explorer:
     Attributes:
         points: at least one.
         across, upward: quantities that either axis may show, with the one shown at first in front.
-        colours: colours by kind.
+        colours: colours by kind; marks follow their order.
         pictures: PNG or WebP files by name.
         truths: names of the pictures with which groups are compared, by group.
         note: text below the plot.
@@ -78,7 +86,9 @@ class Explorer:
 
 def shown(explorer: Explorer) -> dict[str, Any]:
     """The data for the template of the page."""
+    shapes = {kind: SHAPES[number % len(SHAPES)] for number, kind in enumerate(explorer.colours)}
     given = {
+        "shapes": shapes,
         "across": list(explorer.across),
         "upward": list(explorer.upward),
         "colours": dict(explorer.colours),
@@ -97,6 +107,7 @@ def shown(explorer: Explorer) -> dict[str, Any]:
     }
     return {
         "explorer_given": given,
+        "explorer_shapes": shapes,
         "explorer_groups": list(dict.fromkeys(point.group for point in explorer.points)),
         "explorer_kinds": list(dict.fromkeys(point.kind for point in explorer.points)),
     }

@@ -120,8 +120,9 @@
     }
     made("path", { d: path, class: "front" });
     for (const point of points) {
-      const place = { cx: across.place(point.values[x]), cy: upward.place(point.values[y]) };
-      const dot = made("circle", { ...place, r: 5, fill: given.colours[point.kind], tabindex: 0, role: "button" });
+      const place = [across.place(point.values[x]), upward.place(point.values[y])];
+      const mark = { d: given.shapes[point.kind], fill: given.colours[point.kind], transform: `translate(${place})` };
+      const dot = made("path", { ...mark, class: "dot", tabindex: 0, role: "button" });
       dot.setAttribute("aria-label", point.title);
       if (point === picked) dot.classList.add("picked");
       dot.addEventListener("mouseenter", () => tell(point));

@@ -6,8 +6,10 @@ from __future__ import annotations
 import io
 import re
 from dataclasses import replace
+from typing import Any
 
 import pytest
+from axe_playwright_python.sync_playwright import Axe
 from PIL import Image
 from playwright.sync_api import expect
 
@@ -43,7 +45,7 @@ PAGE = Report(title="explorer", lead=["text"], key_numbers=None, explorer=EXPLOR
 @pytest.mark.parametrize("opened", [PAGE], indirect=True, ids=["plain"])
 def test_points_show_their_settings_and_pictures(opened: Opened) -> None:
     page = opened.page
-    dots, title = page.locator("#explorer circle"), page.locator("#explorer .title")
+    dots, title = page.locator("#explorer .dot"), page.locator("#explorer .title")
     expect(dots).to_have_count(4)
     dots.nth(1).hover()
     expect(title).to_have_text("setting 1")
@@ -79,10 +81,33 @@ def test_the_page_is_self_contained() -> None:
 @pytest.mark.parametrize("opened", [PAGE], indirect=True, ids=["front"])
 def test_the_line_is_the_front(opened: Opened) -> None:
     page = opened.page
-    places = [[float(dot.get_attribute(name) or 0) for name in ("cx", "cy")] for dot in page.locator("circle").all()]
+    moves = [dot.get_attribute("transform") or "" for dot in page.locator(".dot").all()]
+    places = [[float(number) for number in re.findall(r"[\d.]+", move)] for move in moves]
     path = page.locator(".front").get_attribute("d") or ""
     assert path.count("H") == path.count("V") == 2 and path.startswith(f"M{places[0][0]:g}"[:6])
     assert places[0][0] < places[1][0] < places[3][0] < places[2][0] and places[0][1] < places[3][1] < places[2][1]
+
+
+@pytest.mark.parametrize("opened", [PAGE], indirect=True, ids=["grey"])
+def test_kinds_differ_in_their_marks(opened: Opened) -> None:
+    """As the legend says, so that they can be told apart in grey."""
+    marks = [dot.get_attribute("d") for dot in opened.page.locator(".dot").all()]
+    assert len(set(marks[:3])) == 1 and marks[3] not in marks[:3]
+    legend = opened.page.locator(".legend path")
+    assert [mark.get_attribute("d") for mark in legend.all()] == [marks[0], marks[3]]
+
+
+@pytest.mark.parametrize("scheme", ["light", "dark"])
+@pytest.mark.parametrize("opened", [PAGE], indirect=True, ids=["axe"])
+def test_no_rule_of_axe_is_broken(opened: Opened, scheme: Any) -> None:
+    page = opened.page
+    page.emulate_media(color_scheme=scheme)
+    for width in (1440, 1024, 390):
+        page.set_viewport_size({"width": width, "height": 900})
+        page.locator("#explorer .dot").nth(1).click()
+        found = Axe().run(page)
+        assert found.violations_count == 0, found.generate_report()
+        assert page.evaluate("document.documentElement.scrollWidth") <= width
 
 
 def test_an_explorer_without_points_is_refused() -> None:
