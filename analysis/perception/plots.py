@@ -63,7 +63,7 @@ def _curve(axis: Axes, part: pd.DataFrame, row: Mapping[str, Any], label: str, s
     named = {"marker": mark, "ms": 4, "markevery": [], **line_style(style)}  # beside its label the curve has the mark
     if np.isfinite(row.get("mu", np.nan)):
         x = np.geomspace(levels[0], levels[-1], 200)
-        jnd = f"{row['jnd']:.0f}" if 0.0 < row["jnd"] < np.inf else str(row["status"])
+        jnd = f"{row['jnd']:.0f}" if 0.0 < row["jnd"] < np.inf else f"{row['status']} all levels"
         shares = correct_share(x, row["mu"], row["sigma"], row["lapse"], guess)
         axis.plot(x, shares, **named, label=f"{label}, JND {jnd}")
     else:
