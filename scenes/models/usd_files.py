@@ -24,7 +24,7 @@ from scenes.models.motion import Pose
 from scenes.models.smoothing import unit_normals, with_corners
 from scenes.models.sources import Sources
 from scenes.models.usd_curves import curves_of
-from scenes.models.usd_instances import PointInstances, prims_of
+from scenes.models.usd_instances import PointInstances
 from scenes.models.usd_library import Gf, Tf, Usd, UsdGeom, UsdLux, UsdShade, UsdSkel, UsdUtils
 from scenes.models.usd_losses import lose_settings, lose_unread
 from scenes.models.usd_materials import UsdMaterials
@@ -36,21 +36,16 @@ from scenes.models.usd_meshes import (
     triangles_of,
 )
 from scenes.models.usd_motion import UsdMotion
+from scenes.models.usd_repeats import Repeat, Repeats
 from scenes.models.usd_shapes import KINDS as SHAPES
 from scenes.models.usd_shapes import shapes_of
+from scenes.models.usd_text import refuse_nested
 from scenes.models.usd_textures import Pictures, UsdDocument, UsdTextures
 from scenes.models.usd_values import finite, note_animated
 from scenes.models.usd_views import LAMP, camera_of, glow_of, light_of
 
 _GREY = 0.18
 _ADDRESS = re.compile(r"anon:0x[0-9a-fA-F]+:?")
-_NESTED = re.compile(
-    rb'"""(?s:.*?)"""|"(?:\\.|[^"\\\n])*+"|\'(?:\\.|[^\'\\\n])*+\'|#[^\n]*|@[^@\n]*@'
-    rb"|[=:]\s*\[(?:[\s\d.,()einfaE+-]|#[^\n]*)*+(\[)"
-)
-"""Strings, comments and files of USD text, and numbers in which a further list begins. Repetitions are possessive:
-others take 100 bytes of memory for each byte."""
-
 _RULE = re.compile(r" matching pxrInternal.*?(?= at ')")  # of OpenUSD's grammar
 _SAID_MOST = 200  # characters of a message, which may quote the rest of the file
 _Part = tuple[Any, Material, Matrix]
@@ -65,7 +60,7 @@ def read_usd(sources: Sources, report: LossReport, facets: bool = False, time_s:
     Raises:
         SceneError: the file cannot be read.
     """
-    _refuse_nested(sources)
+    refuse_nested(sources)
     quiet = UsdUtils.CoalescingDiagnosticDelegate()  # its messages would go to standard error
     try:
         stage = Usd.Stage.Open(str(sources.path))
@@ -82,22 +77,6 @@ def read_usd(sources: Sources, report: LossReport, facets: bool = False, time_s:
     finally:
         quiet.TakeCoalescedDiagnostics()
         del quiet
-
-
-def _refuse_nested(sources: Sources) -> None:
-    """Refuses lists within lists of numbers, after which the library quotes the rest of the file at each number.
-
-    Raises:
-        SceneError: there is one.
-    """
-    with sources.path.open("rb") as file:
-        if file.read(5) != b"#usda":
-            return
-    content = sources.path.read_bytes()
-    at = next((one.start(1) for one in _NESTED.finditer(content) if one[1]), None)
-    if at is not None:
-        line, column = content.count(b"\n", 0, at) + 1, at - content.rfind(b"\n", 0, at)
-        raise SceneError(f"cannot be read: {line}:{column}: expected numbers, got a list within a list")
 
 
 class _Reader:
@@ -123,13 +102,18 @@ class _Reader:
     def model(self) -> Model:
         self._bend()
         lose_settings(self.stage, self.report)
-        shown = list(prims_of(self.stage.GetPseudoRoot(), Usd.PrimDefaultPredicate, self.motion))
-        tracks = self.motion.tracks(shown)
-        bound = UsdShade.MaterialBindingAPI.ComputeBoundMaterials(shown)[0]
-        self._materials = {prim.GetPath(): material for prim, material in zip(shown, bound, strict=True)}
-        for prim in shown:
-            self.instances.admit(prim)
-            self._add(prim, self.motion.matrix(prim), tracks.get(self.motion.mover(prim)))
+        shown, alike = Repeats(self.motion).walk(self.stage.GetPseudoRoot())
+        plain = [prim for number, prim in enumerate(shown) if number not in alike]
+        tracks = self.motion.tracks(plain)
+        bound = UsdShade.MaterialBindingAPI.ComputeBoundMaterials(plain)[0]
+        self._materials = {prim.GetPath(): material for prim, material in zip(plain, bound, strict=True)}
+        places = iter(self.motion.matrices([shown[number] for number in alike]))
+        for number, prim in enumerate(shown):
+            if number in alike:
+                self._repeat(alike[number], next(places))
+            else:
+                self.instances.admit(prim)
+                self._add(prim, self.motion.matrix(prim), tracks.get(self.motion.mover(prim)))
         up = "z" if self.up_is_z else "y"
         return Model(tuple(self._parts), tuple(self._lights), self._cameras, up, self.motion.pose.counts)
 
@@ -170,6 +154,23 @@ class _Reader:
             self._cameras[key] = camera_of(prim, self.code, matrix, track, self.report)
         elif prim.HasAPI(UsdLux.LightAPI):
             self._light(prim, matrix, track, name)
+
+    def _repeat(self, repeat: Repeat, matrix: Matrix) -> None:
+        """Adds an instance that is like an earlier one."""
+        if repeat.parts is None:
+            repeat.parts = []
+            for prim, place in zip(repeat.inner, repeat.places, strict=True):
+                found, both = self._shapes(prim)
+                name = f"{self._stem}/{prim.GetName()}"
+                repeat.parts += [(shape, stuff, product(place, local), name, both) for shape, stuff, local in found]
+        for prim in repeat.inner:
+            self.instances.admit(prim)
+        for shape, material, local, name, both in repeat.parts:
+            place = product(matrix, local)
+            if determinant(place[:3, :3]) == 0.0:
+                self.report.add(name.rpartition("/")[2], "a node without extent")
+            else:
+                self._parts.append(Instance(shape, material, place, None, name, emission_twosided=both))
 
     def _light(self, prim: Any, matrix: Matrix, track: RigidTrack | None, name: str) -> None:
         if determinant(matrix[:3, :3]) == 0.0:

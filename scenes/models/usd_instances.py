@@ -22,10 +22,10 @@ _AMONG = Usd.PrimIsActive & Usd.PrimIsLoaded  # prototypes may lie below a class
 Inner = list[tuple[Any, Matrix]]
 
 
-def prims_of(root: Any, among: Any, motion: UsdMotion) -> Iterator[Any]:
+def prims_of(root: Any, among: Any, motion: UsdMotion, within: bool = True) -> Iterator[Any]:
     """Visible prims at and below a root that hold something, within instances too; those below a point instancer
-    are its prototypes."""
-    walk = iter(Usd.PrimRange(root, Usd.TraverseInstanceProxies(among)))
+    are its prototypes. Without ``within`` instances are given in place of what is within them."""
+    walk = iter(Usd.PrimRange(root, Usd.TraverseInstanceProxies(among) if within else among))
     for prim in walk:
         if prim.IsPseudoRoot():
             continue
@@ -39,6 +39,9 @@ def prims_of(root: Any, among: Any, motion: UsdMotion) -> Iterator[Any]:
             if visible.Get(motion.code) == UsdGeom.Tokens.invisible:
                 walk.PruneChildren()
                 continue
+        if not within and prim.IsInstance():
+            yield prim
+            continue
         if imageable.ComputePurpose() in (UsdGeom.Tokens.proxy, UsdGeom.Tokens.guide):
             continue
         if prim.IsA(UsdGeom.PointInstancer):

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import itertools
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from scenes.arithmetic import affine, inverse, product
 from scenes.canonical import Matrix, RigidTrack, SceneError
@@ -18,12 +20,14 @@ class UsdMotion:
     Attributes:
         pose: time at which everything is read that does not move rigidly.
         code: its time code.
+        moves: whether any transform changes over time.
     """
 
     def __init__(self, stage: Any, pose: Pose) -> None:
         self._rate = float(stage.GetTimeCodesPerSecond()) or 24.0
-        moving = [prim for prim in stage.Traverse(Usd.TraverseInstanceProxies()) if prim.IsA(UsdGeom.Xformable)]
-        samples = [code for prim in moving for code in UsdGeom.Xformable(prim).GetTimeSamples()]
+        within = (prim for prototype in stage.GetPrototypes() for prim in Usd.PrimRange(prototype))
+        every = (UsdGeom.Xformable(prim) for prim in itertools.chain(stage.Traverse(), within))
+        samples = [code for xform in every if xform for code in xform.GetTimeSamples()]
         given = stage.HasAuthoredTimeCodeRange()
         first = stage.GetStartTimeCode() if given else min(samples, default=0.0)
         last = stage.GetEndTimeCode() if given else max(samples, default=first)
@@ -31,7 +35,7 @@ class UsdMotion:
         self._last_s = (last - first) / self._rate if samples else 0.0
         self.pose, self.code = pose, Usd.TimeCode(first + pose.time_s * self._rate)
         self._first, self._now = UsdGeom.XformCache(Usd.TimeCode(first)), UsdGeom.XformCache(self.code)
-        self._moves = bool(samples)
+        self.moves = bool(samples)
         self._movers: dict[str, str] = {"/": ""}
         self._tracks: dict[str, RigidTrack] = {}
 
@@ -44,6 +48,24 @@ class UsdMotion:
         cache = self._first if self.mover(prim) in self._tracks else self._now
         return _finite(cache.GetLocalToWorldTransform(prim), prim)
 
+    def matrices(self, prims: list[Any]) -> NDArray[np.float64]:
+        """Transforms ``(n, 4, 4)`` from prims to the world of a stage that does not move.
+
+        Raises:
+            SceneError: one is not finite.
+        """
+        world = [self._now.GetLocalToWorldTransform(prim) for prim in prims]
+        found = np.array(world, np.float64).reshape(-1, 4, 4).transpose(0, 2, 1)
+        plain = np.isfinite(found).all(axis=(1, 2)) & (found[:, 3] == (0.0, 0.0, 0.0, 1.0)).all(axis=1)
+        for number in np.flatnonzero(~plain).tolist():
+            found[number] = _finite(world[number], prims[number])
+        return found
+
+    def relative(self, prim: Any, above: Any) -> Matrix | None:
+        """The transform from a prim to one above it; None if it does not follow it."""
+        found, reset = self._now.ComputeRelativeTransform(prim, above)
+        return None if reset else _finite(found, prim)
+
     def matrix_below(self, prim: Any, root: Any) -> Matrix:
         """The transform from a prim of a prototype to the space of its instances, with that of its root."""
         above = self._now.GetParentToWorldTransform(root)
@@ -51,7 +73,7 @@ class UsdMotion:
 
     def mover(self, prim: Any) -> str:
         """The path of the nearest prim at or above a prim that moves; empty if there is none."""
-        if not self._moves:
+        if not self.moves:
             return ""
         path = str(prim.GetPath())
         if path not in self._movers:

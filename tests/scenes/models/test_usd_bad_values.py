@@ -10,7 +10,7 @@ import pytest
 
 from scenes.canonical import ConstantTexture, DirectionalLight, EnvironmentLight, MetallicRough, SceneError
 from scenes.formats.losses import LossReport
-from scenes.models import read_model, read_whole, usd_files
+from scenes.models import read_model, read_whole, usd_text
 from scenes.models.sources import Sources
 from tests.scenes.models.usd import BOUND, QUAD, READER, ST, material, mesh, texture, written
 
@@ -68,7 +68,7 @@ def test_the_search_for_lists_within_lists_takes_no_more_memory_than_the_file(tm
     points = ", ".join(20_000 * ["(0.5, 0.25, -2e-3)"])
     sources = Sources(written(tmp_path, f'def Mesh "m" {{ point3f[] points = [{points} # end\n] }}'))
     tracemalloc.start()
-    usd_files._refuse_nested(sources)
+    usd_text.refuse_nested(sources)
     most = tracemalloc.get_traced_memory()[1]
     tracemalloc.stop()
     assert most < 2 * sources.path.stat().st_size
