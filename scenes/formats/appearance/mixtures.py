@@ -53,9 +53,9 @@ def _lets_through(part: Material | Texture, again: Callable[[Material | Texture]
 
 
 def direct_if_same(scene: Scene) -> Scene:
-    """The scene with direct light in place of Whitted's method, if nothing mirrors, refracts or has holes: rays of this
-    method go on from such surfaces alone, so the picture is the same."""
-    whitted = scene.integrator.kind == "whitted" and scene.integrator.depth != 0
+    """The scene with direct light of depth 1 in place of Whitted's method, or of greater depth, if nothing mirrors,
+    refracts or has holes: rays of these go on from such surfaces alone, so the picture is the same."""
+    whitted = scene.integrator.kind in ("whitted", "direct") and scene.integrator.depth != 0
     if not whitted or any(once_a_node(_has_sharp_parts, one.material) for one in scene.instances):
         return scene
     return dataclasses.replace(scene, integrator=dataclasses.replace(scene.integrator, kind="direct", depth=1))

@@ -76,6 +76,10 @@ class LuxWriter(LuxSurfaceWriter, SceneWriter):
         kind = _INTEGRATORS[integrator.kind]
         if integrator.kind in ("whitted", "metropolis"):
             self.report.add("integrator", integrator.kind, kind, integrator.kind != "metropolis")
+        elif integrator.kind == "direct" and depth <= 1:
+            kind = "path"  # LuxCore has no other, and draws light of all paths for directlighting
+        elif integrator.kind == "direct":
+            self.report.add("integrator", "direct light and what mirrors show", "light of all paths in LuxCore")
         edges = depth + 1  # LuxCore counts edges of a path
         limit = f'"integer eyedepth" [ {edges} ] "integer lightdepth" [ {edges} ]'
         if kind != "bidirectional":
