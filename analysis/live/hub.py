@@ -57,7 +57,7 @@ class Hub:
         self._watchers: dict[int, Watcher] = {}
         self._driver, self._came = 0, 0
         self.display, self._lock = DisplayChoices(), threading.RLock()
-        self._drawn: dict[str, tuple[Any, tuple[PagePixels, str]]] = {}
+        self._drawn: dict[str, tuple[Any, tuple[PagePixels, Key]]] = {}
         self._told: dict[str, tuple[Any, tuple[float | None, float | None]]] = {}
 
     def came(self) -> Watcher:
