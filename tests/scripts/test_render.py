@@ -204,7 +204,7 @@ def test_the_film_of_a_scene_file_is_obeyed(render, tmp_path: Path) -> None:
 
 @pytest.mark.parametrize(
     ("arguments", "message"),
-    [(("--size", "800"), "size: expected such as 800x600, got '800'"), (("--size", "0x9"), "sides_px: expected"),
+    [(("--size", "800"), "size: expected such as 800x600, got '800'"), (("--size", "0x9"), "size: expected sides"),
      (("--size", "9x9", "--width-px", "9"), "size: expected none together with width_px and height_px"),
      (("--size", "9x9", "--crop", "5", "5", "5", "4"), "crop: expected a part of 9 x 9 pixels"),
      (("--environment", "gone.hdr"), "gone.hdr: cannot be read (No such file or directory)"),
