@@ -8,10 +8,9 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.ticker import LogLocator
 
 from analysis.metrics.arrays import Floats
-from analysis.page.figures import ADAPTIVE, FRAMED, label_ends, line_style, new_figure, styles
+from analysis.page.figures import ADAPTIVE, FRAMED, label_ends, line_style, new_figure, plain_log, styles
 
 _TITLE_CHARACTERS = 105  # characters in a line above the figure
 
@@ -74,9 +73,7 @@ def _widen(axis, values: Floats) -> None:
     finite = values[np.isfinite(values)]
     low, high = (finite.min(), finite.max()) if finite.size else (1.0, 1.0)
     axis.set_ylim(min(low * 0.8, 1 / 3), max(high * 1.25, 3.0))
-    axis.yaxis.set_major_formatter("{x:g}")
-    axis.yaxis.set_minor_formatter("")
-    axis.yaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
+    plain_log(axis.yaxis)
 
 
 def stage_figure(modelled: Mapping[str, float], measured: Mapping[str, float]) -> Figure:

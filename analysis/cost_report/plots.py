@@ -10,9 +10,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.ticker import LogLocator, MaxNLocator
+from matplotlib.ticker import MaxNLocator
 
-from analysis.page.figures import ADAPTIVE, FRAMED, INKS, label_ends, line_style, save
+from analysis.page.figures import ADAPTIVE, FRAMED, INKS, label_ends, line_style, plain_log, save
 from analysis.storage.files import atomic
 
 if TYPE_CHECKING:
@@ -172,9 +172,7 @@ def scaling_figure(cells: Sequence[Cell], laws: Mapping[str, PowerLaw], centre: 
                       label=f"{name}: straight line")  # fmt: skip
         axis.set_yscale("log")
         axis.set_ylabel("ms per cycle")
-        axis.yaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
-        axis.yaxis.set_major_formatter("{x:g}")
-        axis.yaxis.set_minor_formatter("")
+        plain_log(axis.yaxis)
     left.set_xscale("log", base=2)
     left.xaxis.set_major_formatter("{x:g}")
     left.set_xlabel(f"{_AXES['batch_size']}, at {centre[1]}²")

@@ -16,10 +16,12 @@ from typing import Any
 import numpy as np
 from matplotlib import rc_context
 from matplotlib.axes import Axes
+from matplotlib.axis import Axis
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patheffects import withStroke
+from matplotlib.ticker import LogLocator
 from matplotlib.transforms import Affine2D, ScaledTranslation, blended_transform_factory
 from numpy.typing import ArrayLike, NDArray
 
@@ -84,6 +86,13 @@ def line_style(style: int) -> dict:
     width = 2.0 if style == 0 else 1.4
     ink = INKS[ink_of(style)]
     return {"color": ink, "linewidth": width, "linestyle": dashed(style, width), "zorder": 3 - 0.1 * style}
+
+
+def plain_log(axis: Axis, subs: Sequence[float] = (1.0, 2.0, 5.0)) -> None:
+    """Labels a logarithmic axis with plain numbers, at these multiples of the powers of ten."""
+    axis.set_major_locator(LogLocator(subs=tuple(subs)))
+    axis.set_major_formatter("{x:g}")
+    axis.set_minor_formatter("")
 
 
 def label_ends(axis: Axes) -> None:

@@ -12,10 +12,9 @@ from matplotlib.cm import ScalarMappable
 from matplotlib.colors import LogNorm
 from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
-from matplotlib.ticker import LogLocator
 from PIL import Image
 
-from analysis.page.figures import ADAPTIVE, GRID, INKS, MARKERS, ink_of, label_ends, line_style, save
+from analysis.page.figures import ADAPTIVE, GRID, INKS, MARKERS, ink_of, label_ends, line_style, plain_log, save
 from analysis.page.pictures import RATE_MAP, number
 
 if TYPE_CHECKING:
@@ -213,9 +212,7 @@ def line_figure(lines: Lines) -> Figure | None:
         axis.set_xlabel(f"{kind}{', octaves' if kind == 'bias' else ', log2 of power'}")
         axis.set_xticks(sorted({line[column] for line in part}))
     axes[0].set_ylabel("error of thesis / framed (* default)")
-    axes[0].yaxis.set_major_locator(LogLocator(subs=tuple(range(1, 10))))
-    axes[0].yaxis.set_major_formatter("{x:g}")
-    axes[0].yaxis.set_minor_formatter("")
+    plain_log(axes[0].yaxis, range(1, 10))
     label_ends(axes[-1])
     return figure
 

@@ -8,10 +8,9 @@ from typing import Any
 
 import numpy as np
 from matplotlib.figure import Figure
-from matplotlib.ticker import LogLocator
 
 from analysis.metrics.quality import WHISKERS, percentile
-from analysis.page.figures import ADAPTIVE, FRAMED, GRID, INKS, dashed, ink_of, label_ends, new_figure, save
+from analysis.page.figures import ADAPTIVE, FRAMED, GRID, INKS, dashed, ink_of, label_ends, new_figure, plain_log, save
 from analysis.study.cases import ROWS, Case
 from analysis.study.evaluation import Resources
 from analysis.study.inputs import INPUTS
@@ -163,9 +162,7 @@ def boxes(results: Results, names: Sequence[str], title: str) -> Figure | None:
     if not drawn:
         return None
     axes[0].set_ylabel("error of thesis / framed")
-    axes[0].yaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
-    axes[0].yaxis.set_major_formatter("{x:g}")
-    axes[0].yaxis.set_minor_formatter("")
+    plain_log(axes[0].yaxis)
     divisor = results.all[0].run.case.scale.divisor
     here = {side: f"{side // divisor}²" + (f" (thesis: {side}²)" if divisor > 1 else "") for side in _INK}
     handles = [_patch(color, _HATCH[side], here[side]) for side, color in _INK.items()]
@@ -201,9 +198,7 @@ def errors(results: Results, name: str) -> Figure | None:
                 _refreshes(axis, one)
                 axis.plot(one.times["time_s"], _positive(one.times["mse"]), color=FRAMED, linewidth=2.4, label="framed")
         axis.set_yscale("log")
-        axis.yaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
-        axis.yaxis.set_major_formatter("{x:g}")
-        axis.yaxis.set_minor_formatter("")
+        plain_log(axis.yaxis)
         axis.set_title(f"{name}, {side}²", loc="left", fontsize=10)
         axis.set_ylabel("mean squared error")
     axes[-1].set_xlabel("simulated time, s")
@@ -231,9 +226,7 @@ def ratio_over_time(results: Results, row: int) -> Figure | None:
     axis.axhline(high + 1.5 * (high - low), color="0.2", linewidth=0.9, label="outliers above")
     axis.axhline(1.0, color=FRAMED, linewidth=0.9, label="equal error")
     axis.set_yscale("log")
-    axis.yaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
-    axis.yaxis.set_major_formatter("{x:g}")
-    axis.yaxis.set_minor_formatter("")
+    plain_log(axis.yaxis)
     axis.set_xlabel("simulated time, s   (dotted: the framed display changes)")
     axis.set_ylabel("error of thesis / framed")
     axis.set_title(

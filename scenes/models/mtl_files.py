@@ -56,11 +56,6 @@ class Entry:
 
     lines: dict[str, str] = field(default_factory=dict)
 
-    @property
-    def without_maps(self) -> Entry:
-        """The same without its images."""
-        return Entry({keyword: rest for keyword, rest in self.lines.items() if not keyword.startswith(_MAPS)})
-
     def number(self, name: str, default: float) -> float:
         words = self.lines.get(name, "").split()
         return _number(words[-1]) if words else default

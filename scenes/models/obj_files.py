@@ -157,12 +157,6 @@ def _materials(file: _File, sources: Sources, report: LossReport, facets: bool) 
         for name in names:
             path = sources.known(name, sources.path.stem, report, "the materials")
             found = entries("" if path is None else text_of(path)) | found
-    for name, entry in found.items():
-        if name not in file.groups:
-            try:
-                material_of(name, entry.without_maps, sources, LossReport(), facets)
-            except SceneError as error:
-                report.hint(f"material {name}, which no face has", str(error))
     return {name: _material(name, found[name], sources, report, facets) for name in file.groups if name in found}
 
 

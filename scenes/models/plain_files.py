@@ -53,11 +53,7 @@ def read_plain(sources: Sources, report: LossReport, facets: bool = False) -> tu
 def _report_unread(model: PlyModel, name: str, report: LossReport) -> None:
     """Reports what a PLY file has beside its mesh, its colours and its picture."""
     for element in model.header.elements:
-        if element.name not in _READ:
-            if element.count and not any(kind for _, _, kind in element.properties):  # the others are reported already
-                report.add(
-                    name, f"{element.count} elements of the kind {element.name!r}", picture=element.name != "edge"
-                )
+        if element.name not in _READ:  # reported already
             continue
         unread = {part[0]: part[1] for part in element.properties if part[0] not in _READ[element.name]}
         if element.name in SURFACES and unread.keys() & {*_REDS}:

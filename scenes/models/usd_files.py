@@ -135,15 +135,9 @@ class _Reader:
 
     def _add(self, prim: Any, matrix: Matrix, track: RigidTrack | None) -> None:
         """Adds what a prim itself holds."""
-        name = f"{self._stem}/{prim.GetName()}"
         if prim.IsA(UsdGeom.Gprim):
-            if determinant(matrix[:3, :3]) == 0.0:
-                self.report.add(prim.GetName(), "a node without extent")
-                return
-            parts, both = self._shapes(prim)
-            for shape, material, local in parts:
-                place = product(matrix, local)
-                self._parts.append(Instance(shape, material, place, track, name, emission_twosided=both))
+            if not self._flat(prim, matrix, "a node"):
+                self._put(prim, *self._shapes(prim), matrix, track)
             return
         lose_unread(prim, self.report)
         if prim.IsA(UsdGeom.PointInstancer):
@@ -153,7 +147,24 @@ class _Reader:
             note_animated(prim, self.motion.pose)
             self._cameras[key] = camera_of(prim, self.code, matrix, track, self.report)
         elif prim.HasAPI(UsdLux.LightAPI):
-            self._light(prim, matrix, track, name)
+            self._light(prim, matrix, track)
+
+    def _flat(self, prim: Any, matrix: Matrix, what: str) -> bool:
+        """Whether a transform has no extent, which is a loss."""
+        if determinant(matrix[:3, :3]) != 0.0:
+            return False
+        self.report.add(prim.GetName(), f"{what} without extent")
+        return True
+
+    def _put(self, prim: Any, parts: list[_Part], both: bool, matrix: Matrix, track: RigidTrack | None) -> None:
+        """Adds the shapes of a prim, which have ``both`` sides or one."""
+        name = self._name(prim)
+        for shape, material, local in parts:
+            place = product(matrix, local)
+            self._parts.append(Instance(shape, material, place, track, name, emission_twosided=both))
+
+    def _name(self, prim: Any) -> str:
+        return f"{self._stem}/{prim.GetName()}"
 
     def _repeat(self, repeat: Repeat, matrix: Matrix) -> None:
         """Adds an instance that is like an earlier one."""
@@ -161,20 +172,14 @@ class _Reader:
             repeat.parts = []
             for prim, place in zip(repeat.inner, repeat.places, strict=True):
                 found, both = self._shapes(prim)
-                name = f"{self._stem}/{prim.GetName()}"
-                repeat.parts += [(shape, stuff, product(place, local), name, both) for shape, stuff, local in found]
-        for prim in repeat.inner:
+                repeat.parts.append(([(shape, stuff, product(place, local)) for shape, stuff, local in found], both))
+        for prim, (parts, both) in zip(repeat.inner, repeat.parts, strict=True):
             self.instances.admit(prim)
-        for shape, material, local, name, both in repeat.parts:
-            place = product(matrix, local)
-            if determinant(place[:3, :3]) == 0.0:
-                self.report.add(name.rpartition("/")[2], "a node without extent")
-            else:
-                self._parts.append(Instance(shape, material, place, None, name, emission_twosided=both))
+            if not self._flat(prim, matrix, "a node"):
+                self._put(prim, parts, both, matrix, None)
 
-    def _light(self, prim: Any, matrix: Matrix, track: RigidTrack | None, name: str) -> None:
-        if determinant(matrix[:3, :3]) == 0.0:
-            self.report.add(prim.GetName(), "a light without extent")
+    def _light(self, prim: Any, matrix: Matrix, track: RigidTrack | None) -> None:
+        if self._flat(prim, matrix, "a light"):
             return
         note_animated(prim, self.motion.pose)
         light, lamp = light_of(prim, self.code, matrix, self.pictures, self.up_is_z, self.report)
@@ -184,7 +189,7 @@ class _Reader:
                 self.motion.pose.add(prim.GetName(), "a moving light")
         elif lamp is not None:
             shape, place, radiance = lamp
-            self._parts.append(Instance(shape, LAMP, place, track, name, radiance))
+            self._parts.append(Instance(shape, LAMP, place, track, self._name(prim), radiance))
 
     def _instances(self, prim: Any, matrix: Matrix, track: RigidTrack | None) -> None:
         """Adds the instances of a point instancer."""

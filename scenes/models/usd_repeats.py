@@ -6,6 +6,7 @@ from collections.abc import Hashable
 from dataclasses import dataclass
 from typing import Any
 
+from scenes.arithmetic import determinant
 from scenes.canonical import Material, Matrix, Shape
 from scenes.models.usd_instances import prims_of
 from scenes.models.usd_library import Usd, UsdGeom, UsdShade
@@ -22,12 +23,13 @@ class Repeat:
     Attributes:
         inner: prims within the first of them.
         places: transforms from these to the instance.
-        parts: their shapes, materials and transforms, names, and whether they have both sides, once they are read.
+        parts: for each of them its shapes with materials and transforms to the instance, and whether they have both
+            sides; None until they are read.
     """
 
     inner: list[Any]
     places: list[Matrix]
-    parts: list[tuple[Shape, Material, Matrix, str, bool]] | None = None
+    parts: list[tuple[list[tuple[Shape, Material, Matrix]], bool]] | None = None
 
 
 class Repeats:
@@ -88,10 +90,10 @@ class Repeats:
         return self._collections[path]
 
     def _places(self, prim: Any, inner: list[Any]) -> list[Matrix] | None:
-        """Transforms from shapes within an instance to its own space; None if it holds anything but shapes that move
-        with it."""
+        """Transforms from shapes within an instance to its own space; None if it holds anything but shapes with an
+        extent that move with it."""
         if prim in inner or not all(one.IsA(UsdGeom.Gprim) for one in inner):
             return None
         found = [self.motion.relative(one, prim) for one in inner]
-        places = [one for one in found if one is not None]
+        places = [one for one in found if one is not None and determinant(one[:3, :3]) != 0.0]
         return places if len(places) == len(found) else None

@@ -25,6 +25,7 @@ from scenes.formats.losses import LossReport
 UVS = (("u", "v"), ("s", "t"), ("texture_u", "texture_v"), ("texture_s", "texture_t"))
 COLOURS = (("red", "green", "blue"), ("r", "g", "b"), ("diffuse_red", "diffuse_green", "diffuse_blue"))
 SURFACES = ("face", "tristrips")
+_UNSEEN = ("edge",)  # elements that no picture shows
 
 
 def read_ply(content: bytes, name: str, report: LossReport) -> Mesh:
@@ -83,6 +84,9 @@ def _tables(header: Header, name: str, report: LossReport) -> dict[str, dict[str
     tables: dict[str, dict[str, NDArray]] = {}
     at = 0
     for element in header.elements:
+        if element.count and element.name not in ("vertex", *SURFACES):
+            seen = element.name not in _UNSEEN
+            report.add(name, f"{element.count} elements of the kind {element.name!r}", picture=seen)
         if any(kind for _, _, kind in element.properties):
             if numbers is None:
                 faces, at = _binary_faces(body, at, element, order, name)
@@ -90,8 +94,6 @@ def _tables(header: Header, name: str, report: LossReport) -> dict[str, dict[str
                 faces, at = _ascii_faces(numbers, at, element, name)
             if element.name in SURFACES:
                 tables[element.name] = dict(zip(("corners", "counts"), faces, strict=True))
-            elif element.count:
-                report.add(name, f"{element.count} elements of the kind {element.name!r}")
         elif numbers is None:
             tables[element.name], at = _binary_columns(body, at, element, order, name)
         else:

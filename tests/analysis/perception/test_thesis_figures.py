@@ -12,6 +12,7 @@ from PIL import Image
 
 from analysis.perception.anomaly import chance_rises, described, of_the_set, table
 from analysis.perception.options import AnomalyOptions
+from analysis.perception.plots import psychometric_figure
 from analysis.perception.thesis_figures import densities
 from renderer.sampling.plan import SamplePlan, box_warp, triangle_warp
 from tests.scripts.commands import call_script, one_line
@@ -78,3 +79,12 @@ def test_sets_that_do_not_differ_are_said_to_be_alike() -> None:
     rows = table({27: 2.0 * shifts, 64: shifts}, "planescene")
     assert rows["set_share"].item() == 0.0 and np.isnan(rows["deviations"].item()) and np.isnan(rows["chance"].item())
     assert "sets differ by no more than the shifts do by chance" in described(rows, {})
+
+
+def test_a_label_says_on_which_side_of_the_levels_a_threshold_lies() -> None:
+    trials = pd.DataFrame({"observer": "A", "scene": "plane", "samples": [8, 27, 64], "correct": True})
+    for jnd, status, wanted in ((30.0, "within", "30"), (0.0, "below", "below all levels"),
+                                (np.inf, "above", "above all levels")):  # fmt: skip
+        row = {"mu": 1.4, "sigma": 0.2, "lapse": 0.0, "jnd": jnd, "status": status}
+        drawn = psychometric_figure(trials, "scene", {"plane": row}, "human")
+        assert f"plane, JND {wanted}" in [text.get_text() for text in drawn.axes[0].texts]

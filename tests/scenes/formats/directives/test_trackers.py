@@ -12,10 +12,11 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from scenes.canonical import ConstantTexture, Matte, Mesh, OrthographicCamera, PerspectiveCamera, PointLight
+from scenes.canonical import ConstantTexture, Matte, Mesh, Mirror, OrthographicCamera, PerspectiveCamera, PointLight
 from scenes.formats.conversion import load_scene_file, save_scene_file
 from scenes.formats.losses import LossReport
-from tests.scenes.formats.files import HEAD, pbrt
+from tests.scenes.formats.files import HEAD, pbrt, seen
+from tests.scenes.formats.test_light import even, furnace
 
 V4 = 'Film "rgb"\nCamera "perspective"\nWorldBegin\n'
 POINT = 'Rotate 90 0 0 1\nTranslate 0 0 5\nScale 2 2 2\nLightSource "point" "{}" [ 1 0 0 ]\nShape "sphere"\n'
@@ -175,3 +176,12 @@ def test_reflectances_above_1_are_1_where_the_target_refuses_or_changes_them(to:
     save_scene_file(scene, path, to, report)
     assert load_scene_file(path).instances[0].material == Matte(ConstantTexture((1.0, 0.5, 0.25)))
     assert "a reflectance of 1.2" in [loss.what for loss in report.losses if loss.picture]
+
+
+@pytest.mark.parametrize("kind, name", [(Matte, "Kd"), (Mirror, "Kr")])
+def test_luxcore_takes_reflectances_above_1_for_1(kind: type, name: str, tmp_path: Path) -> None:
+    file = tmp_path / "a.lxs"
+    save_scene_file(furnace([kind(even(1.0))]), file, None)
+    file.write_text(file.read_text().replace(f'"color {name}" [ 1 1 1 ]', f'"color {name}" [ 3 3 3 ]'))
+    assert "[ 3 3 3 ]" in file.read_text()
+    assert seen("luxcore", file, 16, 64)[6:10, 6:10].mean() == pytest.approx(1.0, abs=0.01)
